@@ -1,0 +1,92 @@
+"""Run `kr16` and turn whatever happens into one line on stderr and an exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+from kr16cli.errors import Kr16Error
+
+_OUR_BUG = 70
+_INTERRUPTED = 130
+_USAGE = 2
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        argv: arguments without the program's name; those of the process by default.
+
+    Returns:
+        The exit code: 0 done, 1 it ran and the answer is no, 2 usage or input or output,
+        3 no physical answer, 4 an optional part is missing, 70 our bug, 130 interrupted.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    debug = bool(os.environ.get("KR16_DEBUG"))
+    if "--debug" in arguments:
+        arguments.remove("--debug")
+        debug = True
+    try:
+        code = _run(arguments)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        _drop_stdout()  # the reader has seen enough, as in `kr16 ... | head`
+        return 0
+    except KeyboardInterrupt:
+        return _complain("interrupted; nothing more was written", _INTERRUPTED)
+    except Kr16Error as error:
+        if debug:
+            raise
+        return _complain(str(error), error.exit_code)
+    except OSError as error:
+        if debug:
+            raise
+        _drop_stdout()
+        name = error.filename or "standard output"
+        return _complain(f"{name}: {error.strerror or error}", _USAGE)
+    except Exception as error:
+        if debug:
+            raise
+        if hasattr(error, "format_message"):  # typer's own usage errors
+            return _complain(str(error.format_message()), _USAGE)
+        kind, text = type(error).__name__, " ".join(str(error).split())
+        return _complain(f"this is our bug: {kind}: {text}; --debug shows where", _OUR_BUG)
+    return code
+
+
+def _run(arguments: list[str]) -> int:
+    """Find the command and run it; shell completion is left to typer."""
+    import typer
+
+    from kr16cli.cli.app import app
+
+    command = typer.main.get_command(app)
+    if "_KR16_COMPLETE" in os.environ:
+        command.main(args=arguments, prog_name="kr16")
+    try:
+        with command.make_context("kr16", arguments) as context:
+            code = command.invoke(context)
+    except typer.Exit as stop:
+        code = stop.exit_code
+    except typer.Abort:
+        raise KeyboardInterrupt from None
+    return code if isinstance(code, int) else 0
+
+
+def _complain(text: str, code: int) -> int:
+    """One line on stderr."""
+    if sys.stderr is not None:
+        prefix = "kr16: " if code == _INTERRUPTED else "kr16: error: "
+        print(prefix + " ".join(text.split()), file=sys.stderr)
+    return code
+
+
+def _drop_stdout() -> None:
+    """Let the interpreter's last flush of stdout go nowhere, so that it cannot fail again."""
+    try:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (AttributeError, OSError, ValueError):
+        sys.stdout = None

@@ -1,0 +1,96 @@
+"""Options that several commands share, so that each is written and explained once.
+
+All are text or flags: `values` turns text into numbers, which keeps pydantic out of start-up.
+A metavar of several words says how many numbers an option takes (see `command`).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+_SIX_MM = "Six numbers, mm and degrees, or KRL text {X ..,Y ..,Z ..,A ..,B ..,C ..}."
+
+Joints = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="A1 A2 A3 A4 A5 A6", help="Joint angles in degrees; - reads rows from stdin."
+    ),
+]
+Pose = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="X Y Z A B C", help="Pose in mm and degrees; - reads rows from stdin."),
+]
+Robot = Annotated[
+    str | None,
+    typer.Option("--robot", metavar="FILE", help="Parameter file, or a shipped name: kr16_l6."),
+]
+Si = Annotated[bool, typer.Option("--si", help="Angles in rad and lengths in m, in and out.")]
+Source = Annotated[
+    str | None,
+    typer.Option("--input", metavar="FILE", help="Rows from a CSV or npz file; - is stdin."),
+]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="Any bad row: exit code 2 and nothing is written.")
+]
+Format = Annotated[
+    str | None, typer.Option("--format", metavar="FORMAT", help="table, json, csv or npz.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Short for --format json.")]
+Output = Annotated[
+    str | None,
+    typer.Option("--output", "-o", metavar="FILE", help="Write here; the suffix sets the format."),
+]
+Krl = Annotated[
+    str | None, typer.Option("--krl", metavar="TEXT", help="The input as KRL text in braces.")
+]
+Tool = Annotated[
+    str | None,
+    typer.Option("--tool", metavar="X Y Z A B C", help=f"Tool seen from the flange. {_SIX_MM}"),
+]
+Base = Annotated[
+    str | None,
+    typer.Option("--base", metavar="X Y Z A B C", help=f"Base seen from robroot. {_SIX_MM}"),
+]
+Near = Annotated[
+    str | None,
+    typer.Option(
+        "--near",
+        metavar="A1 A2 A3 A4 A5 A6",
+        help="The configuration to stay near; it also supplies free angles. Default: zeros.",
+    ),
+]
+Qd = Annotated[
+    str | None,
+    typer.Option("--qd", metavar="Q1 Q2 Q3 Q4 Q5 Q6", help="Joint speeds, deg/s (rad/s)."),
+]
+Qdd = Annotated[
+    str | None,
+    typer.Option(
+        "--qdd", metavar="Q1 Q2 Q3 Q4 Q5 Q6", help="Joint accelerations, deg/s2 (rad/s2)."
+    ),
+]
+Tau = Annotated[
+    str | None,
+    typer.Option("--tau", metavar="T1 T2 T3 T4 T5 T6", help="Joint torques, N m."),
+]
+Payload = Annotated[
+    str | None,
+    typer.Option(
+        "--payload",
+        metavar="M X Y Z [IX IY IZ]",
+        help="Load at the flange: kg, mm (m), kg m2; or LOAD_DATA text {M ..,CM {..},J {..}}.",
+    ),
+]
+LoadData = Annotated[
+    str | None,
+    typer.Option("--load-data", metavar="TEXT", help="The payload as KUKA LOAD_DATA text."),
+]
+Drives = Annotated[
+    bool, typer.Option("--drives", help="Count rotor inertia and friction of the data file.")
+]
+Gravity = Annotated[
+    str | None,
+    typer.Option("--gravity", metavar="GX GY GZ", help="Gravity in robroot, m/s2."),
+]

@@ -1,0 +1,191 @@
+"""Read batches: CSV (comma, semicolon or tab, decimal comma too) and npz, from file or stdin."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from io import BytesIO, StringIO
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from kr16cli.cli.values import number
+from kr16cli.errors import FileError, InputError, Kr16Error
+
+_NPZ_MAGIC = b"PK\x03\x04"
+
+GROUPS: Mapping[str, tuple[str, ...]] = {
+    "q": ("a1", "a2", "a3", "a4", "a5", "a6"),
+    "pose": ("x", "y", "z", "a", "b", "c"),
+    **{name: tuple(f"{name}{i}" for i in range(1, 7)) for name in ("qd", "qdd", "tau")},
+}
+"""Columns of each group of numbers in a CSV file; in npz `q qd qdd tau` and, for poses, `T`."""
+
+# Columns that this program writes itself are passed over in silence.
+_OWN = {"status", "reason", "units", "s", "t", "solutions", "residual", *sum(GROUPS.values(), ())}
+
+
+class Row(NamedTuple):
+    """One row: its groups of numbers as read, or the reason why it cannot be used."""
+
+    values: Mapping[str, Any]
+    problem: str | None = None
+
+
+class Batch(NamedTuple):
+    """The rows of a file, what it is called in messages, and warnings about it."""
+
+    name: str
+    rows: list[Row]
+    warnings: list[str]
+
+
+def read(source: str, needed: str, optional: Sequence[str] = ()) -> Batch:
+    """Read a batch.
+
+    Args:
+        source: path of a CSV or npz file; "-" for stdin.
+        needed: group every row must have, "q" or "pose".
+        optional: groups taken where the file has them.
+
+    Raises:
+        FileError: the file cannot be read or has no usable header.
+    """
+    name = "stdin" if source == "-" else source
+    try:
+        content = sys.stdin.buffer.read() if source == "-" else Path(source).read_bytes()
+    except IsADirectoryError:
+        raise FileError(name, "is a directory; name a CSV or npz file") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise FileError(name, f"cannot be read: {reason}") from None
+    if content.startswith(_NPZ_MAGIC):
+        return Batch(name, _npz_rows(content, name, needed, optional), [])
+    return _csv_batch(content, name, needed, optional)
+
+
+def _csv_batch(content: bytes, name: str, needed: str, optional: Sequence[str]) -> Batch:
+    import csv
+
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise FileError(name, f"not UTF-8 text at byte {error.start}, and no npz") from None
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    if not first:
+        raise FileError(name, f"is empty; it needs a header {','.join(GROUPS[needed])}")
+    delimiter = next((mark for mark in (";", "\t") if mark in first), ",")
+    lines = csv.reader(StringIO(text, newline=""), delimiter=delimiter, skipinitialspace=True)
+    try:
+        table = [line for line in lines if line]
+    except csv.Error as error:
+        raise FileError(name, f"line {lines.line_num}: no CSV: {error}") from None
+    header = [cell.strip().lower() for cell in table[0]]
+    taken = _columns(header, name, needed, optional)
+    extra = [cell for cell in header if cell and cell not in _OWN]
+    warnings = [f"{name}: columns not used: {', '.join(extra)}"] if extra else []
+    comma = delimiter != ","
+    rows = [_csv_row(cells, len(header), taken, decimal_comma=comma) for cells in table[1:]]
+    return Batch(name, rows, warnings)
+
+
+def _columns(
+    header: list[str], name: str, needed: str, optional: Sequence[str]
+) -> dict[str, list[int]]:
+    """Where each group's columns stand; FileError where the needed ones are not all there."""
+    taken: dict[str, list[int]] = {}
+    for group in (needed, *optional):
+        present = [column for column in GROUPS[group] if column in header]
+        if not present and group != needed:
+            continue
+        missing = [column for column in GROUPS[group] if column not in header]
+        if missing:
+            raise FileError(
+                name,
+                f"the header lacks {', '.join(missing)}; it must name {','.join(GROUPS[group])} "
+                f"in any order, found: {', '.join(header)[:80]}",
+            )
+        double = next((column for column in present if header.count(column) > 1), None)
+        if double:
+            raise FileError(name, f"the header names {double} twice")
+        taken[group] = [header.index(column) for column in GROUPS[group]]
+    return taken
+
+
+def _csv_row(
+    cells: list[str], width: int, taken: Mapping[str, list[int]], *, decimal_comma: bool
+) -> Row:
+    if len(cells) > width:
+        return Row({}, f"{len(cells)} cells where the header has {width}")
+    cells = cells + [""] * (width - len(cells))
+    if decimal_comma:
+        cells = [cell.replace(",", ".") for cell in cells]
+    try:
+        return Row(
+            {
+                group: [
+                    number(cells[at], column)
+                    for column, at in zip(GROUPS[group], columns, strict=True)
+                ]
+                for group, columns in taken.items()
+            }
+        )
+    except Kr16Error as error:
+        return Row({}, str(error))
+
+
+def _npz_rows(content: bytes, name: str, needed: str, optional: Sequence[str]) -> list[Row]:
+    import numpy as np
+
+    keys = {"q": "q", "pose": "T"}
+    shapes: dict[str, tuple[int, ...]] = {"pose": (4, 4)}
+    try:
+        with np.load(BytesIO(content), allow_pickle=False) as archive:
+            arrays = {
+                group: np.asarray(archive[keys.get(group, group)], dtype=float)
+                for group in (needed, *optional)
+                if keys.get(group, group) in archive
+            }
+            found = ", ".join(archive.files)
+    except Exception as error:
+        raise FileError(name, f"no readable npz: {' '.join(str(error).split())}") from None
+    if needed not in arrays:
+        raise FileError(name, f"lacks the array {keys[needed]}; found: {found}")
+    for group, array in arrays.items():
+        shape = shapes.get(group, (6,))
+        if array.shape[-len(shape) :] != shape:
+            wanted = ", ".join(map(str, shape))
+            raise FileError(
+                name, f"{keys.get(group, group)} has shape {array.shape}; expected (n, {wanted})"
+            )
+        arrays[group] = array.reshape(-1, *shape)
+    count = len(arrays[needed])
+    for group, array in arrays.items():
+        if len(array) != count:
+            raise FileError(name, f"{group} has {len(array)} rows, {needed} has {count}")
+    return list(_array_rows(arrays, count, needed))
+
+
+def _array_rows(arrays: Mapping[str, Any], count: int, needed: str) -> Iterator[Row]:
+    import numpy as np
+
+    finite = np.ones(count, dtype=bool)
+    for array in arrays.values():
+        finite &= np.isfinite(array).reshape(count, -1).all(axis=1)
+    names = {"pose": "T"} if needed == "pose" else {}
+    for i in range(count):
+        if finite[i]:
+            yield Row({names.get(key, key): array[i].tolist() for key, array in arrays.items()})
+        else:
+            yield Row({}, "a number is not finite; every number must be finite")
+
+
+def stdin_is_terminal() -> bool:
+    """Whether reading stdin would wait for someone to type."""
+    return sys.stdin is None or sys.stdin.isatty()
+
+
+def only_one(*given: tuple[str, object]) -> None:
+    """InputError if more than one of several (name, value) inputs was given."""
+    names = [name for name, value in given if value]
+    if len(names) > 1:
+        raise InputError(f"{' and '.join(names)} exclude each other; give one")
