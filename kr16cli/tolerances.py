@@ -16,8 +16,11 @@ class Tolerances:
         a2 = hypot(a3, d4) can fold so far.
     cosine: an elbow cosine beyond 1 by less than this is rounding of a pose made by forward
         kinematics and is taken as 1; it is some thousand units in the last place.
-    merged: a sine of the elbow angle below this reports the elbow pair as merged: two rows
-        whose difference is rounding (the square root of 1 - cos^2 halves the digits).
+    cosine_on_axis: the same where A1 is free: turning A1 to `near` moves the A2 axis against the
+        wrist centre by up to `shoulder`, which changes the cosine by about a1/(a2 L) times it.
+    merged: a sine of the elbow angle below this is taken as 0 and the elbow pair merges: the
+        root of 1 - cos^2 has half the digits, so smaller sines are rounding. It moves the wrist
+        centre by less than 5e-15 m.
     closure: the residual (m, rad) every solution of the inverse kinematics stays below.
     pole: hypot(r11, r21) below this is B = +-90 deg, where A is chosen as 0.
     near_singular: sines of distances to a singular family (shoulder in units of the reach)
@@ -37,6 +40,7 @@ class Tolerances:
     wrist: float = 1e-10
     fold: float = 1e-9
     cosine: float = 1e-12
+    cosine_on_axis: float = 1e-9
     merged: float = 1e-7
     closure: float = 1e-9
     pole: float = 1e-9

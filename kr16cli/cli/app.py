@@ -82,7 +82,6 @@ def root(
 ) -> None:
     """Kinematics, dynamics and simulation of the KUKA KR 16-2.
 
-    \b
     $ kr16 fk 0 -90 90 0 0 0
     $ kr16 ik 1088 0 1320 0 90 0 --json
 

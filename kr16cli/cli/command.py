@@ -61,6 +61,8 @@ def _no_type(ctx: Any) -> None:
 class _Lean:
     """Mixin of commands and groups: parameters of type str and bool are taken as typed."""
 
+    help: str | None
+
     def get_params(self, ctx: Any) -> Any:
         params = super().get_params(ctx)  # type: ignore[misc]
         for param in params:
@@ -70,6 +72,12 @@ class _Lean:
             if param.param_type_name == "argument":
                 param.display_type_rich = _no_type  # the metavar says what is wanted
         return params
+
+    def format_help_text(self, ctx: Any, formatter: Any) -> None:
+        """The help text, with paragraphs of `$ kr16 ...` examples kept line by line."""
+        paragraphs = (self.help or "").split("\n\n")
+        self.help = "\n\n".join(f"\b\n{p}" if p.startswith("$ ") else p for p in paragraphs)
+        super().format_help_text(ctx, formatter)  # type: ignore[misc]
 
 
 class LeanGroup(_Lean, TyperGroup):

@@ -37,24 +37,25 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     except KeyboardInterrupt:
         return _complain("interrupted; nothing more was written", _INTERRUPTED)
-    except Kr16Error as error:
-        if debug:
-            raise
-        return _complain(str(error), error.exit_code)
-    except OSError as error:
-        if debug:
-            raise
-        _drop_stdout()
-        name = error.filename or "standard output"
-        return _complain(f"{name}: {error.strerror or error}", _USAGE)
     except Exception as error:
         if debug:
             raise
-        if hasattr(error, "format_message"):  # typer's own usage errors
-            return _complain(str(error.format_message()), _USAGE)
-        kind, text = type(error).__name__, " ".join(str(error).split())
-        return _complain(f"this is our bug: {kind}: {text}; --debug shows where", _OUR_BUG)
+        if isinstance(error, OSError):
+            _drop_stdout()
+        return _complain(*_explained(error))
     return code
+
+
+def _explained(error: Exception) -> tuple[str, int]:
+    """The line and the exit code for an exception."""
+    if isinstance(error, Kr16Error):
+        return str(error), error.exit_code
+    if isinstance(error, OSError):
+        return f"{error.filename or 'standard output'}: {error.strerror or error}", _USAGE
+    if hasattr(error, "format_message"):  # typer's own usage errors
+        return str(error.format_message()), _USAGE
+    kind, text = type(error).__name__, " ".join(str(error).split())
+    return f"this is our bug: {kind}: {text}; --debug shows where", _OUR_BUG
 
 
 def _run(arguments: list[str]) -> int:

@@ -1,9 +1,5 @@
 """kr16 fk."""
 
-from __future__ import annotations
-
-from typing import Annotated
-
 import typer
 
 from kr16cli.cli import options as o
@@ -19,12 +15,8 @@ def fk(
     values_: o.Joints = None,
     tool: o.Tool = None,
     base: o.Base = None,
-    frames: Annotated[
-        str | None, typer.Option(metavar="WHICH", help="all: in robroot; chapter: the chapter's.")
-    ] = None,
-    mass_centres: Annotated[
-        bool, typer.Option("--mass-centres", help="Add the links' mass centres.")
-    ] = False,
+    frames: o.Frames = None,
+    mass_centres: o.MassCentres = False,
     krl: o.Krl = None,
     si: o.Si = False,
     source: o.Source = None,
@@ -36,7 +28,6 @@ def fk(
 ) -> None:
     """Forward kinematics: joint angles to the pose of the flange.
 
-    \b
     $ kr16 fk 0 -90 90 0 0 0
     $ kr16 fk 10 -80 95 0 -45 30 --tool 0 0 120 0 0 0 --json
 
@@ -45,11 +36,17 @@ def fk(
     """
     from kr16cli.queries.forward import ForwardQuestion
 
-    asked = {
-        "tool": values.pose(tool, "--tool", si=si),
-        "base": values.pose(base, "--base", si=si),
-        "frames": frames,
-        "mass_centres": mass_centres,
-    }
-    code = run.ask(ctx, lambda data: ForwardQuestion(data, si=si, **asked), tables.fk)
-    raise typer.Exit(code)
+    raise typer.Exit(
+        run.ask(
+            ctx,
+            lambda data: ForwardQuestion(
+                data,
+                si=si,
+                tool=values.pose(tool, "--tool", si=si),
+                base=values.pose(base, "--base", si=si),
+                frames=frames,
+                mass_centres=mass_centres,
+            ),
+            tables.fk,
+        )
+    )

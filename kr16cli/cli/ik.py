@@ -1,9 +1,5 @@
 """kr16 ik."""
 
-from __future__ import annotations
-
-from typing import Annotated
-
 import typer
 
 from kr16cli.cli import options as o
@@ -18,23 +14,15 @@ def ik(
     ctx: typer.Context,
     values_: o.Pose = None,
     near: o.Near = None,
-    turns: Annotated[
-        bool, typer.Option("--turns", help="List full-turn variants of A1, A4, A6 too.")
-    ] = False,
-    status: Annotated[
-        str | None, typer.Option("--status", metavar="S", help="Only this Status, 0 to 7.")
-    ] = None,
-    turn: Annotated[
-        str | None, typer.Option("--turn", metavar="T", help="Only this Turn, 0 to 63.")
-    ] = None,
+    turns: o.Turns = False,
+    status: o.Status = None,
+    turn: o.Turn = None,
     tool: o.Tool = None,
     base: o.Base = None,
     krl: o.Krl = None,
     si: o.Si = False,
     source: o.Source = None,
-    track: Annotated[
-        bool, typer.Option("--track", help="Each row stays near the solution before.")
-    ] = False,
+    track: o.Track = False,
     strict: o.Strict = False,
     robot: o.Robot = None,
     format_: o.Format = None,
@@ -43,22 +31,27 @@ def ik(
 ) -> None:
     """Inverse kinematics: a pose to all joint configurations.
 
-    \b
     $ kr16 ik 1088 0 1320 0 90 0 --near 0 -90 90 0 0 0
-    $ kr16 ik --krl '{X 1200,Y 100,Z 900,A 0,B 120,C 0,S 2,T 10}' --json
+    $ kr16 ik --krl '{X 1200,Y 100,Z 900,A 0,B 120,C 0,S 2}' --json
 
     Solutions come nearest to --near first; the largest joint move decides. All branches are
     listed, those outside the limits marked; exit code 3 if none is within.
     """
     from kr16cli.queries.inverse import InverseQuestion
 
-    asked = {
-        "near": values.joints(near, "--near", si=si),
-        "turns": turns,
-        "status": values.whole(status, "--status", 0, 7),
-        "turn": values.whole(turn, "--turn", 0, 63),
-        "tool": values.pose(tool, "--tool", si=si),
-        "base": values.pose(base, "--base", si=si),
-    }
-    code = run.ask(ctx, lambda data: InverseQuestion(data, si=si, **asked), tables.ik)
-    raise typer.Exit(code)
+    raise typer.Exit(
+        run.ask(
+            ctx,
+            lambda data: InverseQuestion(
+                data,
+                si=si,
+                near=values.joints(near, "--near", si=si),
+                turns=turns,
+                status=values.whole(status, "--status", 0, 7),
+                turn=values.whole(turn, "--turn", 0, 63),
+                tool=values.pose(tool, "--tool", si=si),
+                base=values.pose(base, "--base", si=si),
+            ),
+            tables.ik,
+        )
+    )

@@ -22,7 +22,6 @@ def info(
 ) -> None:
     """The robot, where its numbers come from, and which engine runs.
 
-    \b
     $ kr16 info
     $ kr16 info --robot kr16_l6 --json
     """

@@ -1,9 +1,5 @@
 """kr16 jacobian."""
 
-from __future__ import annotations
-
-from typing import Annotated
-
 import typer
 
 from kr16cli.cli import options as o
@@ -18,18 +14,9 @@ def jacobian(
     ctx: typer.Context,
     values_: o.Joints = None,
     qd: o.Qd = None,
-    link: Annotated[
-        str | None, typer.Option("--link", metavar="N", help="Link of the point, 1 to 6.")
-    ] = None,
-    point: Annotated[
-        str | None,
-        typer.Option(
-            "--point", metavar="PX PY PZ", help="In the link's frame; or flange, wrist, tool, com."
-        ),
-    ] = None,
-    axes: Annotated[
-        str, typer.Option("--axes", metavar="AXES", help="robroot, flange or chapter.")
-    ] = "robroot",
+    link: o.Link = None,
+    point: o.Point = None,
+    axes: o.Axes = "robroot",
     tool: o.Tool = None,
     krl: o.Krl = None,
     si: o.Si = False,
@@ -42,7 +29,6 @@ def jacobian(
 ) -> None:
     """The Jacobian, its rate, and how near singularities are.
 
-    \b
     $ kr16 jacobian 0 -90 90 0 30 0
     $ kr16 jacobian 0 -90 90 0 30 0 --qd 10 0 0 0 -5 0 --point wrist --json
 
@@ -50,12 +36,18 @@ def jacobian(
     """
     from kr16cli.queries.velocity import JacobianQuestion
 
-    asked = {
-        "qd": values.joints(qd, "--qd", si=si),
-        "link": values.whole(link, "--link", 1, 6) or 6,
-        "point": values.point(point),
-        "axes": axes,
-        "tool": values.pose(tool, "--tool", si=si),
-    }
-    code = run.ask(ctx, lambda data: JacobianQuestion(data, si=si, **asked), tables.jacobian)
-    raise typer.Exit(code)
+    raise typer.Exit(
+        run.ask(
+            ctx,
+            lambda data: JacobianQuestion(
+                data,
+                si=si,
+                link=values.whole(link, "--link", 1, 6) or 6,
+                point=values.point(point),
+                tool=values.pose(tool, "--tool", si=si),
+                axes=axes,
+                qd=values.six(qd, "--qd"),
+            ),
+            tables.jacobian,
+        )
+    )

@@ -90,6 +90,37 @@ LoadData = Annotated[
 Drives = Annotated[
     bool, typer.Option("--drives", help="Count rotor inertia and friction of the data file.")
 ]
+Frames = Annotated[
+    str | None,
+    typer.Option("--frames", metavar="WHICH", help="all: in robroot; chapter: the chapter's."),
+]
+MassCentres = Annotated[
+    bool, typer.Option("--mass-centres", help="Add the mass centres of the links.")
+]
+Turns = Annotated[bool, typer.Option("--turns", help="List full turns of A1, A4 and A6 too.")]
+Status = Annotated[
+    str | None, typer.Option("--status", metavar="S", help="Only this Status, 0 to 7.")
+]
+Turn = Annotated[str | None, typer.Option("--turn", metavar="T", help="Only this Turn, 0 to 63.")]
+Track = Annotated[
+    bool, typer.Option("--track", help="Each row of --input stays near the solution before.")
+]
+Link = Annotated[
+    str | None, typer.Option("--link", metavar="N", help="Link of the point, 1 to 6; default 6.")
+]
+Point = Annotated[
+    str | None,
+    typer.Option(
+        "--point",
+        metavar="PX PY PZ",
+        help="Point in the link's frame, mm (m); or flange, wrist, tool, com.",
+    ),
+]
+Axes = Annotated[
+    str, typer.Option("--axes", metavar="AXES", help="Of the rows: robroot, flange or chapter.")
+]
+Task = Annotated[bool, typer.Option("--task", help="Add the task-space forms of section 3.6.")]
+Christoffel = Annotated[bool, typer.Option("--christoffel", help="Add the matrices C_k of (3.41).")]
 Gravity = Annotated[
     str | None,
     typer.Option("--gravity", metavar="GX GY GZ", help="Gravity in robroot, m/s2."),

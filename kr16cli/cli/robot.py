@@ -18,7 +18,6 @@ app = new_app(cls=LeanGroup)
 def robot() -> None:
     """Check a parameter file, or write a commented one.
 
-    \b
     $ kr16 robot template -o arm.toml
     $ kr16 robot check arm.toml
     """
@@ -30,7 +29,6 @@ def check(
 ) -> None:
     """Check a parameter file: every broken rule on a line; exit code 2 if there is one.
 
-    \b
     $ kr16 robot check kr16_2
     $ kr16 robot check kr16_l6
     """
@@ -49,7 +47,6 @@ def check(
 def template(output: o.Output = None) -> None:
     """Write a commented parameter file to start from.
 
-    \b
     $ kr16 robot template
     $ kr16 robot template -o mine.toml
     """

@@ -41,7 +41,9 @@ def fk(result: Result, units: Units) -> str:
 def ik(result: Result, units: Units) -> str:
     """Solutions, nearest first, then what is missing and the singular case."""
     unit = units["q"]
-    lines = [f"{len(result['solutions'])} solutions, nearest first; angles in {unit}"]
+    count = len(result["solutions"])
+    order = ", nearest first" if count > 1 else ""
+    lines = [f"{count} solution{'' if count == 1 else 's'}{order}; angles in {unit}"]
     rows = [
         [
             *(shown(angle, unit) for angle in one["q"]),

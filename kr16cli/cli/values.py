@@ -18,7 +18,7 @@ POSE_NAMES = ("X", "Y", "Z", "A", "B", "C")
 def number(text: str, name: str) -> float:
     """One finite number."""
     try:
-        value = float(text)
+        value = float(text if "_" not in text else "")  # 1_000 is Python's, not a user's
     except ValueError:
         shown = f"'{text}'" if text.strip() else "empty"
         raise InputError(f"{name} is {shown}; it must be a number") from None
@@ -38,6 +38,11 @@ def numbers(words: Sequence[str], names: Sequence[str], what: str) -> list[float
 def option(text: str | None, names: Sequence[str], what: str) -> list[float] | None:
     """The numbers of an option, or None where it was not given."""
     return None if text is None else numbers([text], [f"{what} {n}" for n in names], what)
+
+
+def six(text: str | None, what: str) -> list[float] | None:
+    """Six numbers of an option, one for each joint, or None."""
+    return option(text, JOINT_NAMES, what)
 
 
 def joints(text: str | None, what: str, *, si: bool) -> list[float] | None:

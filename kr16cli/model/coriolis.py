@@ -43,7 +43,7 @@ def body_flow(b: Body, omega: Vector) -> Flow:
 
     S = tr(J)/2 1 - J is the matrix of second moments; its columns are crossed with omega.
     """
-    half = (b.xx + b.yy + b.zz) * 0.5
+    half = (b.xx + b.yy + b.zz) / 2
     columns = (
         (half - b.xx, -b.xy, -b.xz),
         (-b.xy, half - b.yy, -b.yz),

@@ -87,7 +87,7 @@ def body_wrench(b: Body, u: Matrix3, acceleration: Vector) -> Wrench:
 
 def _second_moments(b: Body) -> Vector:
     """Integrals of x^2, y^2, z^2 dm from the inertia tensor's diagonal."""
-    half = (b.xx + b.yy + b.zz) * 0.5
+    half = (b.xx + b.yy + b.zz) / 2
     return half - b.xx, half - b.yy, half - b.zz
 
 

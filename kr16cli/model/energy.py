@@ -36,7 +36,7 @@ def potential(
 
 def kinetic(mass_matrix: Sequence[Sequence[Scalar]], qd: Sequence[Scalar]) -> Scalar:
     """Kinetic energy qd^T M qd / 2, J (rotors included as far as M includes them)."""
-    return sum_of(a * b for a, b in zip(qd, matvec(mass_matrix, qd), strict=True)) * 0.5
+    return sum_of(a * b for a, b in zip(qd, matvec(mass_matrix, qd), strict=True)) / 2
 
 
 def base_wrench(

@@ -82,8 +82,10 @@ class _Plane(NamedTuple):
     up: Sequence[Scalar]
 
 
-def _elbows(u: Scalar, w: Scalar, g: Geometry, near: _Near, ns: Functions) -> _Elbow:
+def _elbows(u: Scalar, w: Scalar, g: Geometry, near: _Near, slack: Scalar, ns: Functions) -> _Elbow:
     """q2 and q3 for a wrist centre u forward of and w above the A2 axis, (3.13)-(3.16).
+
+    `slack` is how far the elbow's cosine may pass 1 by rounding.
 
     With L = hypot(a3, d4) and q3' = q3 + atan2(a3, d4):
     u^2 + w^2 = a2^2 + L^2 + 2 a2 L cos q3' (a square, not the printed fourth power).
@@ -92,14 +94,13 @@ def _elbows(u: Scalar, w: Scalar, g: Geometry, near: _Near, ns: Functions) -> _E
     tilt, cos_tilt, sin_tilt = ns.atan2(g.a3, g.d4), g.d4 / forearm, g.a3 / forearm
     square = u * u + w * w
     cosine = (square - (g.a2 * g.a2 + forearm * forearm)) / (2 * g.a2 * forearm)
-    beyond = cosine * cosine > (1 + TOLERANCES.cosine) ** 2
-    c = ns.where(beyond, math.nan, cosine)
-    sine_square = (1 - c) * (1 + c)
-    s = ns.sqrt(ns.where(sine_square < 0, 0, sine_square))
+    sine_square = (1 - cosine) * (1 + cosine)
+    c = ns.where(sine_square < -2 * slack, math.nan, cosine)
+    s = ns.sqrt(ns.where(sine_square < TOLERANCES.merged * TOLERANCES.merged, 0, sine_square))
     bend = ns.atan2(s, c)
     # -bend - tilt >= -3 pi / 2 and bend - tilt <= 3 pi / 2: each can leave (-pi, pi] at one end.
     q3_under, q3_over = -bend - tilt, bend - tilt
-    q3_under = ns.where(q3_under <= -ns.pi, q3_under + 2 * ns.pi, q3_under)
+    q3_under = ns.where(q3_under <= -ns.pi, (ns.pi - tilt) + (ns.pi - bend), q3_under)
     q3_over = ns.where(q3_over > ns.pi, q3_over - 2 * ns.pi, q3_over)
 
     folded = square < TOLERANCES.fold * TOLERANCES.fold
@@ -143,12 +144,13 @@ def solve(
     )
     side = ns.where(on_axis, 1, -1)
     back = _Plane([side * v for v in front.forward], [side * v for v in front.lateral], front.up)
+    slack = ns.where(on_axis, TOLERANCES.cosine_on_axis, TOLERANCES.cosine)
     behind = turned_back(q1, ns.where(on_axis, 0, ns.pi), ns)
 
     angles: list[list[Scalar]] = []
     reach, straight, folds = [], [], []
     for first, forward, plane in ((q1, radius, front), (behind, -radius, back)):
-        elbows = _elbows(forward - g.a1, z - g.d1, g, free, ns)
+        elbows = _elbows(forward - g.a1, z - g.d1, g, free, slack, ns)
         reach.append(elbows.reach)
         folds.append(elbows.folded)
         for (q2, q3), forearm in zip(elbows.pairs, elbows.forearm, strict=True):

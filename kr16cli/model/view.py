@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 
 from kr16cli.model import chain, forward, jacobian
 from kr16cli.model.chain import Frame
-from kr16cli.model.scalars import Scalar, Trig, Vector
+from kr16cli.model.scalars import ZERO, Scalar, Trig, Vector
 from kr16cli.robot import Geometry
 
 Axes = Literal["robroot", "flange", "chapter"]
@@ -40,7 +40,7 @@ class View(NamedTuple):
         a = forward.arm(cs, self.geometry)
         if self.point is None and self.link == 6:
             return a, a.flange_p
-        x, y, z = self.point if self.point is not None else (0.0, 0.0, 0.0)
+        x, y, z = self.point if self.point is not None else (ZERO, ZERO, ZERO)
         return a, self._link_frame(cs).apply((x, y, z))
 
     def _link_frame(self, cs: Trig) -> Frame:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
@@ -41,9 +42,9 @@ class Question(ABC):
     reads: ClassVar[str] = "q"
     optional: ClassVar[tuple[str, ...]] = ()
 
-    units: Mapping[str, str]
-    column_units: Mapping[str, str]
-    options: Mapping[str, Any]
+    units: dict[str, str]
+    column_units: dict[str, str]
+    options: dict[str, Any]
 
     def __init__(self, data: RobotData, *, si: bool) -> None:
         self.data, self.si = data, si
@@ -66,8 +67,8 @@ class Question(ABC):
         """The units of a CSV row in a word or two."""
         return f"{self.length_unit} {self.angle_unit}"
 
-    def follow(self, answer: Answer) -> None:
-        """Let the next row stay near this answer; only inverse kinematics cares."""
+    def follow(self, answer: Answer) -> None:  # noqa: B027  (only inverse kinematics cares)
+        """Let the next row stay near this answer."""
 
     def read_krl(self, text: str) -> list[float]:
         """The input from KRL text: joint angles here."""
@@ -127,22 +128,22 @@ def inverse_pose(T: Sequence[Sequence[float]]) -> Matrix:
     return [*rows, [0.0, 0.0, 0.0, 1.0]]
 
 
-def chained(*poses: Matrix | None) -> Matrix:
-    """Product of 4x4 transforms; None stands for the identity."""
-    result: Matrix | None = None
-    for pose in poses:
-        if pose is not None:
-            result = pose if result is None else product(result, pose)
-    if result is None:
-        raise InputError("no pose to chain")
-    return plain(result)
+def chained(before: Matrix | None, pose: Matrix, after: Matrix | None) -> Matrix:
+    """Product of three 4x4 transforms; None stands for the identity."""
+    result = pose if before is None else product(before, pose)
+    result = result if after is None else product(result, after)
+    finite: Matrix = plain(result)
+    return finite
 
 
 def plain(value: Any) -> Any:
-    """Numbers as floats without -0.0, in lists of the same shape."""
+    """Numbers as floats without -0.0, in lists of the same shape; InputError on overflow."""
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
-    return float(value) + 0.0
+    number = float(value) + 0.0
+    if not math.isfinite(number):
+        raise InputError("the result is not finite: a number of the input is too large")
+    return number
 
 
 def flat(name: str, value: Any) -> dict[str, Any]:

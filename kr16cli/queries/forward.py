@@ -11,7 +11,7 @@ from kr16cli.model import forward
 from kr16cli.model.scalars import FLOATS
 from kr16cli.queries.common import Answer, Question, chained, inverse_pose, plain
 from kr16cli.robot import RobotData
-from kr16cli.single import Arm
+from kr16cli.single import Arm, Base
 
 _POSE = ("x", "y", "z", "a", "b", "c", "s", "t")
 FRAMES = ("all", "robroot", "chapter")
@@ -78,7 +78,7 @@ class ForwardQuestion(Question):
         if self.frames is not None:
             result |= self._frames(q, cs or FLOATS.trig(q))
         if self.mass_centres:
-            axes = "chapter" if self.frames == "chapter" else "robroot"
+            axes: Base = "chapter" if self.frames == "chapter" else "robroot"
             points = self.arm.mass_centres(q, axes)
             result["mass_centres"] = [self.lengths(p) for p in points]
         warnings = self.limit_warnings(q)
@@ -91,7 +91,7 @@ class ForwardQuestion(Question):
         return Answer(result, warnings)
 
     def _frames(self, q: list[float], cs: Sequence[tuple[float, float]]) -> dict[str, Any]:
-        axes = "chapter" if self.frames == "chapter" else "robroot"
+        axes: Base = "chapter" if self.frames == "chapter" else "robroot"
         frames = {name: plain(T) for name, T in self.arm.frames(q, axes, cs).items()}
         wrist = [row[3] for row in frames["frame5"][:3]]
         return {

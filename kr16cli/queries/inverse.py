@@ -164,6 +164,8 @@ class InverseQuestion(Question):
         g = self.data.geometry
         forearm = math.hypot(g.a3, g.d4)
         distance = math.sqrt(square)
+        if not math.isfinite(units.mm(distance)):
+            return "out of reach: farther away than a number can say"
         if cosine > 0:
             limit, side, excess = g.a2 + forearm, "at most", distance - (g.a2 + forearm)
         else:
@@ -261,7 +263,7 @@ class InverseQuestion(Question):
 def _best(result: Mapping[str, Any] | None) -> dict[str, Any] | None:
     solutions: list[dict[str, Any]] = result["solutions"] if result else []
     inside = [one for one in solutions if one["within_limits"]]
-    return (inside or solutions or [None])[0]
+    return next(iter(inside or solutions), None)
 
 
 def _case(kind: str, joint: str, value: float, unit: str, what: str) -> dict[str, Any]:

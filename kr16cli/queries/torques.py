@@ -102,7 +102,7 @@ class DynamicsQuestion(Question):
             qdd, moving = self.radians(typed["qdd"]), "the given qdd"
             result["torque"] = plain(arm.inverse_dynamics(q, qd, qdd))
         kinetic, potential = arm.energy(q, qd)
-        result["energy"] = {"kinetic": kinetic + 0.0, "potential": potential + 0.0}
+        result["energy"] = {"kinetic": plain(kinetic), "potential": plain(potential)}
         result["base_wrench"] = plain(arm.base_wrench(q, qd, qdd))
         result["base_wrench_of"] = moving
         if self.christoffel:

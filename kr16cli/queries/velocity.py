@@ -132,7 +132,7 @@ class JacobianQuestion(Question):
             "axes": self.axes,
             "rows": list(ROWS),
             "jacobian": J,
-            "determinant": determinant + 0.0,
+            "determinant": plain(determinant),
             "singular_values": sigma,
             **_condition(sigma),
             "manipulability": math.prod(sigma),

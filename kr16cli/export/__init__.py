@@ -1,0 +1,1 @@
+"""The robot as a file for other programs: `urdf.urdf` (ROS, Pinocchio), `mjcf.mjcf` (MuJoCo)."""

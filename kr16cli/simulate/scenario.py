@@ -1,0 +1,210 @@
+"""Scenarios, schema kr16.scenario/1: the start, the torques and the length of a simulation."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal, cast
+
+from kr16cli.assets import asset
+from kr16cli.errors import FileError
+from kr16cli.robot import Inertia6, Payload, Vector3
+from kr16cli.simulate.scenario_check import SCHEMA, problems_in
+from kr16cli.units import rad
+
+Six = tuple[float, float, float, float, float, float]
+Kind = Literal["zero", "constant", "gravity", "csv"]
+
+_ZEROS: Six = (0.0,) * 6
+
+
+@dataclass(frozen=True)
+class TorqueSpec:
+    """Which joint torques are applied.
+
+    `kind` is "zero", "constant" (`tau`, N m), "gravity" (compensates gravity, payload
+    included) or "csv" (`file` with columns time and tau1 to tau6).
+    """
+
+    kind: Kind = "zero"
+    tau: Six | None = None
+    file: str | None = None
+
+
+@dataclass(frozen=True)
+class SolverSpec:
+    """How the equations of motion are integrated.
+
+    `method` is one of SciPy's solvers; `rtol` and `atol` (rad, rad/s) bound the error of a
+    step; more than `max_steps` steps end the run as failed.
+    """
+
+    method: str = "DOP853"
+    rtol: float = 1e-9
+    atol: float = 1e-10
+    max_steps: int = 100_000
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What is simulated: SI units, joint angles in rad.
+
+    `gravity` (m/s2, robroot) is None for that of the robot's file; `output_step` (s) is the
+    distance of the samples of the run, whose last is at `duration` (s) whatever the step.
+    """
+
+    name: str
+    q: Six
+    qd: Six = _ZEROS
+    duration: float = 1.0
+    output_step: float = 0.01
+    torque: TorqueSpec = TorqueSpec()
+    payload: Payload | None = None
+    drives: bool = False
+    gravity: Vector3 | None = None
+    solver: SolverSpec = SolverSpec()
+    description: str = ""
+    folder: Path = field(default=Path(), compare=False)
+
+    def describe(self) -> dict[str, Any]:
+        """The scenario as a JSON-ready table in SI units; what is None is left out."""
+        table = asdict(self)
+        del table["folder"]
+        table["torque"] = {k: v for k, v in table["torque"].items() if v is not None}
+        return cast("dict[str, Any]", _lists({k: v for k, v in table.items() if v is not None}))
+
+
+def load_scenario(path: str | Path) -> Scenario:
+    """Load and check a scenario.
+
+    Args:
+        path: a TOML file, or the name of a shipped one such as "free_swing".
+
+    Raises:
+        FileError: the file cannot be read or is no TOML.
+        ParameterError: the first broken rule, with key, value and rule.
+    """
+    file = _find(path)
+    return parse_scenario(read_table(file), str(file), file.parent)
+
+
+def read_scenario_table(path: str | Path) -> tuple[dict[str, Any], Path]:
+    """The checked table of a scenario file, and the folder its files are relative to."""
+    file = _find(path)
+    table = read_table(file)
+    parse_scenario(table, str(file))
+    return table, file.parent
+
+
+def parse_scenario(table: Mapping[str, Any], path: str, folder: Path = Path()) -> Scenario:
+    """Check the table of a scenario file and turn it into a Scenario.
+
+    Args:
+        table: what tomllib returns, or a mapping of the same shape.
+        path: what messages call the file.
+        folder: what a torque file's name is relative to.
+
+    Raises:
+        ParameterError: the first broken rule.
+    """
+    problems = problems_in(table, path)
+    if problems:
+        raise problems[0]
+    defaults = Scenario(name="", q=_ZEROS)
+    initial, gravity = table["initial"], table.get("gravity")
+    return Scenario(
+        name=table["name"],
+        description=table.get("description", ""),
+        q=_angles(initial, "q", "q_deg"),
+        qd=_angles(initial, "qd", "qd_deg_s"),
+        duration=float(table["duration_s"]),
+        output_step=float(table.get("output_step_s", defaults.output_step)),
+        torque=_torque(table.get("torque", {"kind": "zero"})),
+        payload=_payload(table["payload"]) if "payload" in table else None,
+        drives=table.get("drives", False),
+        gravity=None if gravity is None else cast("Vector3", _numbers(gravity)),
+        solver=SolverSpec(**table.get("solver", {})),
+        folder=folder,
+    )
+
+
+def _find(path: str | Path) -> Path:
+    """The file meant: a path, or a bare name among the shipped scenarios."""
+    file = Path(path)
+    if file.is_file():
+        return file
+    shipped = {found.stem: found for found in sorted(asset("data/scenarios").glob("*.toml"))}
+    if str(path) in shipped:
+        return shipped[str(path)]
+    if file.exists():
+        return file
+    names = ", ".join(shipped)
+    raise FileError(file, f"no such file, and no shipped scenario of that name; shipped: {names}")
+
+
+def read_table(file: Path) -> dict[str, Any]:
+    """The table of a scenario file; FileError with the reason where there is none."""
+    try:
+        return tomllib.loads(file.read_bytes().decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        reason = f"not UTF-8 text at byte {error.start}; save the file as UTF-8"
+    except IsADirectoryError:
+        reason = "is a directory; name a scenario file in it"
+    except OSError as error:
+        reason = f"cannot be read: {error.strerror or error}"
+    except RecursionError:
+        reason = "no TOML: nested too deeply"
+    except ValueError as error:  # TOMLDecodeError says the line; others come from int()
+        reason = f"no TOML: {' '.join(str(error).split())}"
+    raise FileError(file, reason)
+
+
+def _angles(initial: Mapping[str, Any], key: str, key_deg: str) -> Six:
+    """Six angles or speeds, given in rad or in degrees; zeros where neither is."""
+    if key_deg in initial:
+        return cast("Six", tuple(rad(float(v)) for v in initial[key_deg]))
+    return cast("Six", _numbers(initial.get(key, _ZEROS)))
+
+
+def _torque(table: Mapping[str, Any]) -> TorqueSpec:
+    tau = table.get("tau_nm")
+    return TorqueSpec(
+        kind=table["kind"],
+        tau=None if tau is None else cast("Six", _numbers(tau)),
+        file=table.get("file"),
+    )
+
+
+def _payload(table: Mapping[str, Any]) -> Payload:
+    return Payload(
+        mass=float(table["mass"]),
+        com=cast("Vector3", _numbers(table.get("com", (0.0,) * 3))),
+        inertia=cast("Inertia6", _numbers(table.get("inertia", _ZEROS))),
+    )
+
+
+def _numbers(values: Sequence[float]) -> tuple[float, ...]:
+    """Floats without negative zeros."""
+    return tuple(float(v) + 0.0 for v in values)
+
+
+def _lists(value: Any) -> Any:
+    """Tuples as lists, as JSON has them."""
+    if isinstance(value, Mapping):
+        return {key: _lists(item) for key, item in value.items()}
+    return [_lists(item) for item in value] if isinstance(value, tuple) else value
+
+
+__all__ = [
+    "SCHEMA",
+    "Kind",
+    "Scenario",
+    "Six",
+    "SolverSpec",
+    "TorqueSpec",
+    "load_scenario",
+    "parse_scenario",
+    "read_scenario_table",
+]
