@@ -319,6 +319,24 @@ class Kinematics:
             threads,
         )
 
+    def mass_centre_jacobians(
+        self, q: Like, *, out: Array | None = None, threads: int = 1
+    ) -> Array:
+        """J of each link's mass centre (3.31)-(3.36), (..., 6, 6, 6): link first, robroot axes."""
+        g, bodies = self.data.geometry, self.arm.bodies
+
+        def kernel(cs: Any) -> Iterable[Scalar]:
+            a = forward.arm(cs, g)
+            centres = energy.mass_centres(chain.frames(cs, g), bodies, g)
+            for link, centre in enumerate(centres, 1):
+                yield from flat_rows(jacobian.jacobian(a, centre, link))
+
+        def one(angles: Sequence[float]) -> Array:
+            values = [float(v) for v in kernel(FLOATS.trig(angles))]
+            return np.array(values).reshape(6, 6, 6)
+
+        return self._evaluate({"q": q}, (6, 6, 6), one, kernel, out, threads)
+
     def singularity(self, q: Like) -> SingularityFactors:
         """The factors of det J at q, each of the leading shape."""
         g = self.data.geometry
@@ -343,8 +361,16 @@ class Kinematics:
 
     def rate_matrix(self, rpy: Like) -> Array:
         """B of (3.46), (..., 3, 3): omega = B (phi', theta', psi'), from rpy (..., 3) in rad."""
+        return self._of_rpy(orientation.rate_matrix, rpy)
+
+    def inverse_rate_matrix(self, rpy: Like) -> Array:
+        """B^-1, (..., 3, 3); grows without bound towards theta = +-90 deg."""
+        return self._of_rpy(orientation.inverse_rate_matrix, rpy)
+
+    @staticmethod
+    def _of_rpy(matrix: Callable[[Any], list[list[Scalar]]], rpy: Like) -> Array:
         angles = arrays.checked("rpy", rpy, 3)
-        rows = orientation.rate_matrix(ARRAYS.trig([angles[..., i] for i in range(3)]))
+        rows = matrix(ARRAYS.trig([angles[..., i] for i in range(3)]))
         out = np.zeros((*angles.shape[:-1], 3, 3))
         for i, row in enumerate(rows):
             for j, value in enumerate(row):

@@ -49,7 +49,7 @@ def test_a_thousand_poses_through_ik(tmp_path: Path) -> None:
 
 def test_batch_is_the_loop() -> None:
     joints = _random_joints(20)
-    rows = kr16("fk -", stdin=_csv(joints)) .code
+    rows = kr16("fk -", stdin=_csv(joints)).code
     assert rows == 0
     batch = kr16("fk", "-", "--json", stdin=_csv(joints)).json()["result"]["rows"]
     for q, row in zip(joints, batch, strict=True):

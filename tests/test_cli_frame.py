@@ -292,7 +292,7 @@ def test_stdout_that_cannot_be_written_is_said(redirection: str, why: str) -> No
 def test_stdin_is_argv() -> None:
     done = _process("fk", "-", "--format", "csv", input="a1,a2,a3,a4,a5,a6\n1,-2,3,-4,5,-6\n")
     assert done.returncode == 0
-    single = _process("fk", *"1 -2 3 -4 5 -6 --format csv".split())
+    single = _process("fk", "1", "-2", "3", "-4", "5", "-6", "--format", "csv")
     batch_row = done.stdout.splitlines()[1].split(",")
     assert batch_row[:8] == single.stdout.splitlines()[1].split(",")[:8]
 

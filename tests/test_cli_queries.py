@@ -67,7 +67,8 @@ def test_envelope_names_robot_model_units_and_input(data: RobotData) -> None:
     ("command", "name"),
     [
         ("fk 1 -2 3 4 -5 6", "fk"),
-        ("fk 1 -2 3 4 -5 6 --frames all --mass-centres --tool 1 2 3 4 5 6 --base 1 2 3 4 5 6", "fk"),
+        ("fk 1 -2 3 4 -5 6 --frames all --mass-centres --tool 1 2 3 4 5 6", "fk"),
+        ("fk 1 -2 3 4 -5 6 --base 1 2 3 4 5 6", "fk"),
         ("fk 1 -2 3 4 -5 6 --si --frames chapter", "fk"),
         ("ik 1088 0 1320 0 90 0", "ik"),
         ("ik 1200 300 900 20 100 5 --turns", "ik"),

@@ -73,6 +73,11 @@ class _Lean:
                 param.display_type_rich = _no_type  # the metavar says what is wanted
         return params
 
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """A plain help page; some versions of typer draw boxes whatever they are told."""
+        for part in ("usage", "help_text", "options", "epilog"):
+            getattr(self, f"format_{part}")(ctx, formatter)
+
     def format_help_text(self, ctx: Any, formatter: Any) -> None:
         """The help text, with paragraphs of `$ kr16 ...` examples kept line by line."""
         paragraphs = (self.help or "").split("\n\n")

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from kr16cli.cli import output as out
 from kr16cli.cli import render, values
-from kr16cli.errors import CheckFailedError, InputError
+from kr16cli.errors import CheckFailedError
 
 if TYPE_CHECKING:
     from kr16cli.robot import RobotData
-    from kr16cli.simulate.run import Run
     from kr16cli.simulate.scenario import Scenario
 
 _SIX = ("1", "2", "3", "4", "5", "6")
@@ -55,7 +53,7 @@ Atol = Annotated[
 
 def scenario(p: Mapping[str, Any]) -> Scenario | None:
     """The scenario of a command's parameters, options before the file; None without either."""
-    from kr16cli.simulate.scenario import load_scenario, scenario_table, with_options
+    from kr16cli.simulate.scenario import with_options
 
     si = p["si"]
     q, qd = values.joints(p["q"], "--q", si=si), values.option(p["qd"], _SIX, "--qd")
@@ -72,3 +70,122 @@ def scenario(p: Mapping[str, Any]) -> Scenario | None:
     }
     load = values.payload(p["payload"], p["load_data"], si=si)
     return with_options(p["scene"], options, load)
+
+
+def _number(p: Mapping[str, Any], name: str) -> float | None:
+    """One number of an option, or None where it was not given."""
+    text = p[name]
+    return None if text is None else values.number(text, f"--{name.replace('_', '-')}")
+
+
+def _torque(p: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The torque that options ask for; --tau and --torque-csv say the kind themselves."""
+    tau, file = values.option(p["tau"], _SIX, "--tau"), p["torque_csv"]
+    kind = p["torque"] or ("constant" if tau else "csv" if file else None)
+    if kind is None:
+        return None
+    table = {"kind": kind, "tau_nm": tau, "file": file}
+    return {key: value for key, value in table.items() if value is not None}
+
+
+def simulate(p: Mapping[str, Any], data: RobotData, asked: Scenario) -> None:
+    """Simulate and write: the run as CSV or npz where asked for, else its summary.
+
+    A run in a file leaves stdout to the summary.
+
+    Raises:
+        CheckFailedError: the solver failed; what there is of the run is written first.
+    """
+    json, file = bool(p["json"]), p["output"] not in (None, "-")
+    kind = out.choose_format(p["format_"], json and not file, p["output"])
+    with out.Target(p["output"]) as target:
+        from kr16cli.simulate.experiment import simulate as experiment
+        from kr16cli.simulate.summary import envelope
+
+        run = experiment(data, asked, on_step=_progress(asked.duration))
+        answer = envelope(run, data)
+        texts = {
+            "csv": run.to_csv, "npz": run.to_npz,
+            "json": lambda: render.json_text(answer), "table": lambda: table(answer, si=p["si"]),
+        }  # fmt: skip
+        target.write(texts[kind]())
+        if file and kind in ("csv", "npz"):
+            out.Target(None).write(texts["json" if json else "table"]())
+    warn(answer["warnings"])
+    if run.failure:
+        raise CheckFailedError(_failed(answer["result"]))
+
+
+def _failed(result: Mapping[str, Any]) -> str:
+    """The failure of a run with time and state, in one line."""
+    final = result["final"]
+    q, qd = (" ".join(f"{v:.6g}" for v in final[key]) for key in ("q", "qd"))
+    return (
+        f"the simulation ended at {final['time']:.6g} s: {result['failure']}; there q = {q} rad, "
+        f"qd = {qd} rad/s; the part before is written and marked; try a looser rtol, more "
+        "max_steps or smaller torques"
+    )
+
+
+def table(answer: Mapping[str, Any], *, si: bool = False) -> str:
+    """The summary as a table: a line for each joint, then the pose, energies, events, solver."""
+    from kr16cli import units
+
+    result, solver = answer["result"], answer["result"]["solver"]
+    final, far, energy = result["final"], result["extremes"], result["energy"]
+    unit = "rad" if si else "deg"
+
+    def column(numbers: Sequence[float], of: str) -> list[str]:
+        turned = numbers if si else [units.deg(v) for v in numbers]
+        return [render.shown(v, of) for v in turned]
+
+    joints = zip(
+        far["joint"], column(final["q"], unit), column(far["q_min"], unit),
+        column(far["q_max"], unit), column(final["qd"], unit), column(far["qd_max"], unit),
+        [render.shown(v) for v in final["tau"]], [render.shown(v) for v in far["tau_max"]],
+        strict=True,
+    )  # fmt: skip
+    header = [
+        "", f"q {unit}", "min", "max", f"qd {unit}/s", "largest", "tau N m", "largest",
+    ]  # fmt: skip
+    x, y, z, *abc = final["pose"]
+    place = [v if si else units.mm(v) for v in (x, y, z)]
+    length = "m" if si else "mm"
+    shown = [*(render.shown(v, length) for v in place), *column(abc, unit)]
+    balance = ("kinetic", "potential")
+    return "\n".join(
+        [
+            f"{result['scenario']}: {answer['robot']}, {result['duration']:g} s, "
+            f"{result['samples']} samples{'' if result['complete'] else ', INCOMPLETE'}",
+            *render.grid(header, [list(row) for row in joints]),
+            f"pose {length} {unit}: " + "  ".join(shown),
+            "energy J, start to end: "
+            + ", ".join(
+                f"{k} {energy[f'{k}_initial']:.6g} to {energy[f'{k}_final']:.6g}" for k in balance
+            ),
+            f"  work of torques {energy['work_torque']:.6g}, lost in friction "
+            f"{energy['work_friction']:.6g}, unexplained at most {energy['drift_max']:.1e}",
+            *(f"event at {e['time']:.6f} s: {e['joint']} {e['kind']}" for e in result["events"]),
+            f"solver {solver['method']}, rtol {solver['rtol']:g}, atol {solver['atol']:g}: "
+            f"{solver['steps']} steps, {solver['evaluations']} evaluations",
+            "",
+        ]
+    )
+
+
+def warn(texts: Sequence[str]) -> None:
+    """Warnings on stderr, one a line."""
+    for text in texts:
+        print(f"kr16: warning: {' '.join(text.split())}", file=sys.stderr)
+
+
+def _progress(duration: float) -> Callable[[float], None]:
+    """Shows simulated time on stderr, on a terminal only."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        return lambda t: None
+
+    def tick(t: float) -> None:
+        end = "\r\x1b[K" if t >= duration else ""
+        print(f"\r{t:.3f} of {duration:g} s{end}", end="", file=sys.stderr, flush=True)
+
+    return tick

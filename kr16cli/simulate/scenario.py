@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, cast
 
 from kr16cli.assets import asset
 from kr16cli.errors import FileError
 from kr16cli.robot import Inertia6, Payload, Vector3
-from kr16cli.simulate.scenario_check import SCHEMA, problems_in
+from kr16cli.simulate.scenario_check import DEFAULT_STEP, SCHEMA, problems_in
 from kr16cli.units import rad
 
 Six = tuple[float, float, float, float, float, float]
@@ -59,7 +59,7 @@ class Scenario:
     q: Six
     qd: Six = _ZEROS
     duration: float = 1.0
-    output_step: float = 0.01
+    output_step: float = DEFAULT_STEP
     torque: TorqueSpec = TorqueSpec()
     payload: Payload | None = None
     drives: bool = False
@@ -90,12 +90,39 @@ def load_scenario(path: str | Path) -> Scenario:
     return parse_scenario(read_table(file), str(file), file.parent)
 
 
-def read_scenario_table(path: str | Path) -> tuple[dict[str, Any], Path]:
-    """The checked table of a scenario file, and the folder its files are relative to."""
-    file = _find(path)
-    table = read_table(file)
-    parse_scenario(table, str(file))
-    return table, file.parent
+def with_options(
+    path: str | Path | None, options: Mapping[str, Any], payload: Payload | None = None
+) -> Scenario:
+    """The scenario of a file with some of its values replaced.
+
+    Args:
+        path: as for `load_scenario`; None starts from a scenario of 1 s without torque.
+        options: a table like a scenario file's; None, or an empty table, replaces nothing.
+            The entries of `initial` and `solver` replace one by one, all else as a whole.
+        payload: replaces the file's.
+
+    Raises:
+        FileError, ParameterError: as `load_scenario`; the file itself must be sound.
+    """
+    table: dict[str, Any] = {"schema": SCHEMA, "name": "options", "duration_s": 1.0}
+    folder = Path()
+    if path is not None:
+        file = _find(path)
+        table = read_table(file)
+        parse_scenario(table, str(file))
+        folder = file.parent
+    given = {key: value for key, value in options.items() if value is not None}
+    for key in ("initial", "solver"):
+        own = {k: v for k, v in given.pop(key, {}).items() if v is not None}
+        kept = {k: v for k, v in table.get(key, {}).items() if not _same(k, own)}
+        table[key] = kept | own
+    scenario = parse_scenario(table | given, "options", Path() if "torque" in given else folder)
+    return scenario if payload is None else replace(scenario, payload=payload)
+
+
+def _same(key: str, others: Mapping[str, Any]) -> bool:
+    """Whether a quantity is among others, in whatever unit: q and q_deg, qd and qd_deg_s."""
+    return key.split("_deg")[0] in {other.split("_deg")[0] for other in others}
 
 
 def parse_scenario(table: Mapping[str, Any], path: str, folder: Path = Path()) -> Scenario:
@@ -196,15 +223,3 @@ def _lists(value: Any) -> Any:
         return {key: _lists(item) for key, item in value.items()}
     return [_lists(item) for item in value] if isinstance(value, tuple) else value
 
-
-__all__ = [
-    "SCHEMA",
-    "Kind",
-    "Scenario",
-    "Six",
-    "SolverSpec",
-    "TorqueSpec",
-    "load_scenario",
-    "parse_scenario",
-    "read_scenario_table",
-]

@@ -18,6 +18,7 @@ SCHEMA = "kr16.scenario/1"
 METHODS = ("DOP853", "RK45", "Radau", "LSODA")
 KINDS = ("zero", "constant", "gravity", "csv")
 MOST_SAMPLES = 1_000_000
+DEFAULT_STEP = 0.01
 
 DURATION = Quantity("durations", "s", 86_400.0, "ms", 0.0, True)
 OUTPUT_STEP = Quantity("output steps", "s", 86_400.0, "ms", 0.0, True)
@@ -76,12 +77,11 @@ class _ScenarioChecker(_Checker):
         if "duration_s" not in table:
             return
         duration = self.one_number(table["duration_s"], "duration_s", DURATION)
-        if "output_step_s" not in table:
-            return
-        step = self.one_number(table["output_step_s"], "output_step_s", OUTPUT_STEP)
+        given = table.get("output_step_s", DEFAULT_STEP)
+        step = self.one_number(given, "output_step_s", OUTPUT_STEP)
         if duration is None or step is None:
             return
-        if step > duration:
+        if step > duration and "output_step_s" in table:
             self.fail("output_step_s", step, f"must not exceed duration_s = {duration:g}")
         elif duration / step > MOST_SAMPLES:
             rule = f"makes {duration / step:.3g} samples, more than {MOST_SAMPLES}; make it longer"
