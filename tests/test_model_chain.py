@@ -6,13 +6,13 @@ import math
 from fractions import Fraction
 
 import numpy as np
-import oracles
 import pytest
-import strategies as sg
 from hypothesis import given
 from hypothesis import strategies as st
 
 import kr16cli
+import oracles
+import strategies as sg
 from kr16cli.model import chain, forward
 from kr16cli.robot import Geometry
 

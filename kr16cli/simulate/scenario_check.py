@@ -15,7 +15,7 @@ from kr16cli.robot_check import _Checker
 from kr16cli.robot_rules import GRAVITY, INERTIA, LENGTH, MASS, Quantity, inertia_problem
 
 SCHEMA = "kr16.scenario/1"
-METHODS = ("DOP853", "RK45", "Radau", "LSODA")
+METHODS = ("auto", "DOP853", "RK45", "Radau", "LSODA")
 KINDS = ("zero", "constant", "gravity", "csv")
 MOST_SAMPLES = 1_000_000
 DEFAULT_STEP = 0.01

@@ -38,10 +38,10 @@ def case(
     equations: Sequence[str] = (),
     functions: Sequence[str] = (),
 ) -> Callable[[Callable[[Setting], Finding]], Callable[[Setting], Finding]]:
-    """Register a function as a case; its suite is the last part of its module's name."""
+    """Register a function as a case of the suite whose module or package it stands in."""
 
     def register(run: Callable[[Setting], Finding]) -> Callable[[Setting], Finding]:
-        suite = run.__module__.rsplit(".", 1)[-1]
+        suite = run.__module__.partition(".suites.")[2].partition(".")[0]
         if id in _CASES:
             raise ValueError(f"case {id} is registered twice")
         _CASES[id] = Case(
