@@ -33,6 +33,7 @@ METHODS = [
     Method("fk", 1, (4, 4)),
     Method("mass_centres", 1, (6, 3)),
     Method("jacobian", 1, (6, 6)),
+    Method("mass_centre_jacobians", 1, (6, 6, 6)),
     Method("jacobian_dot", 2, (6, 6)),
     Method("mass_matrix", 1, (6, 6)),
     Method("coriolis_matrix", 2, (6, 6)),
@@ -572,6 +573,25 @@ def test_repr_says_what_is_on(robot: kr16cli.Robot) -> None:
     assert "KR 16-2" in repr(robot)
     assert "payload 16.0 kg" in repr(robot.with_payload(16))
     assert "drives" in repr(kr16cli.load_robot(drives=True))
+
+
+def test_mass_centre_jacobians_are_the_oracles(robot: kr16cli.Robot) -> None:
+    """(3.31)-(3.36) link by link, the payload counted to link 6."""
+    loaded = robot.with_payload(16, (0.05, -0.08, 0.12))
+    q = motions(20)[0]
+    c, s = oracles.turns(q)
+    g = robot.data.geometry
+    others = oracles.moments(g, oracles.bodies(g, robot.data.links, loaded.payload), c, s)
+    ours = loaded.mass_centre_jacobians(q)
+    for i, other in enumerate(others):
+        expected = np.concatenate([other.linear, other.angular], axis=-2)
+        assert np.abs(ours[:, i] - expected).max() <= 5e-15
+
+
+def test_rate_matrix_and_its_inverse_multiply_to_one(robot: kr16cli.Robot) -> None:
+    rpy = np.random.default_rng(51).uniform(-1.4, 1.4, (4, 5, 3))
+    product = robot.rate_matrix(rpy) @ robot.inverse_rate_matrix(rpy)
+    assert np.abs(product - np.eye(3)).max() <= 1e-14
 
 
 def test_numbers_are_repeatable(robot: kr16cli.Robot) -> None:

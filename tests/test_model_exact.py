@@ -171,6 +171,7 @@ def test_mass_centres_equal_the_oracles(cs: Any, g: Any, parts: Any) -> None:
     exact(energy.mass_centres(chain.frames(cs, g), bodies, g), expected)
 
 
+@few
 @given(st.lists(six, min_size=6, max_size=6), six)
 def test_symmetric_solver_solves_exactly(rows: Any, x: Any) -> None:
     """L D L^T on A = R R^T + 1, which is positive definite whatever R is."""

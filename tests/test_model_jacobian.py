@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kr16cli
@@ -124,6 +124,7 @@ _turns = st.lists(
 _speeds = st.lists(st.fractions(-3, 3, max_denominator=9), min_size=6, max_size=6)
 
 
+@settings(max_examples=20)
 @given(_turns, _speeds, links)
 def test_jacobian_and_rate_equal_the_oracles_exactly(
     cs: list[tuple[Fraction, Fraction]], qd: list[Fraction], link: int

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from kr16cli.cli import batch, render, values
 from kr16cli.cli import output as out
-from kr16cli.cli import render, values
 from kr16cli.errors import CheckFailedError
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def simulate(p: Mapping[str, Any], data: RobotData, asked: Scenario) -> None:
         target.write(texts[kind]())
         if record:
             out.Target(None).write(texts["json" if p["json"] else "table"]())
-    warn(answer["warnings"])
+    batch.warn(answer["warnings"])
     if run.failure:
         raise CheckFailedError(_failed(answer["result"]))
 
@@ -179,12 +179,6 @@ def table(answer: Mapping[str, Any], *, si: bool = False) -> str:
             "",
         ]
     )
-
-
-def warn(texts: Sequence[str]) -> None:
-    """Warnings on stderr, one a line."""
-    for text in texts:
-        print(f"kr16: warning: {' '.join(text.split())}", file=sys.stderr)
 
 
 def _progress(duration: float) -> Callable[[float], None]:

@@ -40,7 +40,6 @@ def simulate(
 ) -> None:
     """Simulate a motion: a scenario file, a shipped scenario, or options.
 
-    \b
     $ kr16 simulate free_swing -o swing.npz
     $ kr16 simulate --q 0 -60 60 0 30 0 --duration 0.5 --torque gravity --json
 
