@@ -1,1 +1,0 @@
-"""The registered cases, one module or package per suite."""

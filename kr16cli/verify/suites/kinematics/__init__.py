@@ -1,5 +1,0 @@
-"""Suite `kinematics`: forward kinematics, frames, orientation, posture."""
-
-from kr16cli.verify.suites.kinematics import frames, orientation, posture
-
-__all__ = ["frames", "orientation", "posture"]
