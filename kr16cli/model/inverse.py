@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from kr16cli.model.orientation import Rows
-from kr16cli.model.scalars import Functions, Scalar, Vector, angle_sum
+from kr16cli.model.scalars import Functions, Scalar, Trig, Vector, angle_sum
 from kr16cli.robot import Geometry
 from kr16cli.tolerances import TOLERANCES
 
@@ -71,6 +71,7 @@ class _Elbow(NamedTuple):
     pairs: list[tuple[Scalar, Scalar]]
     forearm: list[tuple[Scalar, Scalar]]
     reach: tuple[Scalar, Scalar]
+    beyond: Scalar
     folded: Scalar
 
 
@@ -95,7 +96,8 @@ def _elbows(u: Scalar, w: Scalar, g: Geometry, near: _Near, slack: Scalar, ns: F
     square = u * u + w * w
     cosine = (square - (g.a2 * g.a2 + forearm * forearm)) / (2 * g.a2 * forearm)
     sine_square = (1 - cosine) * (1 + cosine)
-    c = ns.where(sine_square < -2 * slack, math.nan, cosine)
+    beyond = sine_square < -2 * slack
+    c = ns.where(beyond, math.nan, cosine)
     s = ns.sqrt(ns.where(sine_square < TOLERANCES.merged * TOLERANCES.merged, 0, sine_square))
     bend = ns.atan2(s, c)
     # -bend - tilt >= -3 pi / 2 and bend - tilt <= 3 pi / 2: each can leave (-pi, pi] at one end.
@@ -117,7 +119,7 @@ def _elbows(u: Scalar, w: Scalar, g: Geometry, near: _Near, slack: Scalar, ns: F
         c2_free, s2_free = (ns.where(folded, n, v) for n, v in zip(near.q2, (c2, s2), strict=True))
         pairs.append((principal(ns.atan2(s2_free, c2_free), ns), q3))
         forearms.append(angle_sum((c2_free / norm, s2_free / norm), trig3))
-    return _Elbow(pairs, forearms, (square, cosine), folded)
+    return _Elbow(pairs, forearms, (square, cosine), beyond, folded)
 
 
 def solve(
@@ -127,7 +129,14 @@ def solve(
 
     `near` is the configuration (rad) that supplies free angles. Joint limits are ignored.
     """
-    free = _Near(*((ns.cos(near[i]), ns.sin(near[i])) for i in (0, 1, 3)))
+    return solve_near(rotation, p, g, ns.trig(near), ns)
+
+
+def solve_near(
+    rotation: Rows, p: Sequence[Scalar], g: Geometry, near: Trig, ns: Functions
+) -> Solutions:
+    """`solve` for `near` given as (cos, sin) pairs."""
+    free = _Near(near[0], near[1], near[3])
     x, y, z = wrist_centre(rotation, p, g)
     radius = ns.sqrt(x * x + y * y)
     on_axis = radius < TOLERANCES.shoulder
@@ -153,10 +162,10 @@ def solve(
         elbows = _elbows(forward - g.a1, z - g.d1, g, free, slack, ns)
         reach.append(elbows.reach)
         folds.append(elbows.folded)
+        q1_or_nan = ns.where(elbows.beyond, math.nan, first)
         for (q2, q3), forearm in zip(elbows.pairs, elbows.forearm, strict=True):
             wrists, singular = _wrists(plane, forearm, free, ns)
             straight.append(singular)
-            q1_or_nan = first + q2 * 0  # NaN where this arm posture is out of reach
             angles.extend([q1_or_nan, q2, q3, *wrist] for wrist in wrists)
     return Solutions(angles, reach, on_axis, straight, folds)
 
