@@ -260,8 +260,6 @@ class Kinematics:
         return poses if self.tool is None else poses @ np.linalg.inv(self.tool)
 
     def _jacobian_options(self, link: int, point: Like | None) -> tuple[int, list[float] | None]:
-        if link not in range(1, 7):
-            raise InputError(f"link is {link}; expected 1 to 6")
         if point is not None:
             values = arrays.checked("point", point, 3)
             if values.ndim != 1:
@@ -286,7 +284,7 @@ class Kinematics:
         the rows: robroot, flange or chapter (the chapter's base b).
         """
         link, p = self._jacobian_options(link, point)
-        view = View(self.data.geometry, link, p, axes)
+        view = View.of(self.data.geometry, link, p, axes)
         return self._evaluate(
             {"q": q},
             (6, 6),
@@ -309,7 +307,7 @@ class Kinematics:
     ) -> Array:
         """Rate of `jacobian` along qd, (3.47)-(3.51), (..., 6, 6); `axes` stand still."""
         link, p = self._jacobian_options(link, point)
-        view = View(self.data.geometry, link, p, axes)
+        view = View.of(self.data.geometry, link, p, axes)
         return self._evaluate(
             {"q": q, "qd": qd},
             (6, 6),

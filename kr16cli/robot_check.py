@@ -49,7 +49,7 @@ def problems_in(table: Mapping[str, Any], path: str) -> list[ParameterError]:
         table: what tomllib returns, or a mapping of the same shape.
         path: what messages call the file.
     """
-    checker = _Checker(path)
+    checker = Checker(path)
     checker.robot(table)
     return checker.found
 
@@ -113,7 +113,7 @@ def _join(at: str, key: str) -> str:
     return f"{at}.{key}" if at else key
 
 
-class _Checker:
+class Checker:
     """Collects problems; every method takes the dotted key of what it looks at."""
 
     def __init__(self, path: str) -> None:
@@ -121,9 +121,11 @@ class _Checker:
         self.found: list[ParameterError] = []
 
     def fail(self, key: str, value: object, rule: str) -> None:
+        """Note a broken rule."""
         self.found.append(ParameterError(self.path, key, _short(value), rule))
 
     def robot(self, table: Mapping[str, Any]) -> None:
+        """Check a whole parameter file."""
         if not self.is_table(table, "parameters"):
             return
         optional = ("gravity", "link", "ratings", "conflict")
@@ -160,6 +162,7 @@ class _Checker:
                 self.fail(_join(at, key), None, "this key is needed")
 
     def is_table(self, value: object, key: str) -> TypeGuard[Mapping[str, Any]]:
+        """Whether a value is a table; notes it if not."""
         if isinstance(value, Mapping):
             return True
         self.fail(key, value, f"must be a table, is {_kind(value)}")
@@ -182,6 +185,7 @@ class _Checker:
         return [(key, entry) for key, entry in named if self.is_table(entry, key)]
 
     def joint(self, joint: Mapping[str, Any], at: str) -> None:
+        """Check one joint."""
         self.keys(joint, at, ("name", "limits_deg", "status", "source"), (*JOINT, "note"))
         expected = f"A{at.removeprefix('joint[').removesuffix(']')}"
         self.choice(joint, at, "name", (expected,))
@@ -210,6 +214,7 @@ class _Checker:
             self.fail("joint[1].speed_deg_s", speeds[0], rule)
 
     def link(self, link: Mapping[str, Any], at: str) -> None:
+        """Check one link."""
         needed = ("mass", "com", "inertia", "frame", "status", "source")
         self.keys(link, at, needed, ("tolerance", "note"))
         for key, quantity in LINK.items():
@@ -259,6 +264,7 @@ class _Checker:
             self.text(note, where, "text")
 
     def conflict(self, table: Mapping[str, Any], conflict: Mapping[str, Any], at: str) -> None:
+        """Check one conflict between sources."""
         self.keys(conflict, at, _CONFLICT_KEYS, ())
         self.text(conflict, at, "reason")
         self.sources(conflict, at)
@@ -279,6 +285,7 @@ class _Checker:
             self.fail(f"{at}.chosen", chosen, f"must be what {key} says, {_short(stands)!r}")
 
     def number(self, table: Mapping[str, Any], at: str, key: str, quantity: Quantity) -> None:
+        """Check a number of a table, where it is given."""
         if key in table:
             self.one_number(table[key], _join(at, key), quantity)
 
@@ -313,6 +320,7 @@ class _Checker:
         return good if len(good) == len(checked) else None
 
     def text(self, table: Mapping[str, Any], at: str, key: str) -> None:
+        """Check a printable text, where it is given."""
         if key not in table:
             return
         value = table[key]
@@ -320,6 +328,7 @@ class _Checker:
             self.fail(_join(at, key), value, "must be one line of text, not empty")
 
     def choice(self, table: Mapping[str, Any], at: str, key: str, known: Collection[str]) -> None:
+        """Check a word against the known ones, where it is given."""
         if key not in table:
             return
         value = table[key]
@@ -328,6 +337,7 @@ class _Checker:
             self.fail(_join(at, key), value, f"must be {one_of}{', '.join(known)}")
 
     def sources(self, table: Mapping[str, Any], at: str) -> None:
+        """Check a list of source keys, where it is given."""
         if "source" not in table:
             return
         value = table["source"]

@@ -145,7 +145,7 @@ class Arm:
         `point` (m) is fixed to `link` (1..6) and given in its frame (frame i of Table 3.1; the
         flange for link 6); None is that frame's origin. `axes` are the axes of the rows.
         """
-        view = View(self.geometry, link, point, axes)
+        view = View.of(self.geometry, link, point, axes)
         return _floats(view.jacobian(FLOATS.trig(q)))
 
     def jacobian_dot(
@@ -158,7 +158,7 @@ class Arm:
         axes: Axes = "robroot",
     ) -> Matrix:
         """Rate of the robroot components along qd, shown in `axes` (which stand still)."""
-        view = View(self.geometry, link, point, axes)
+        view = View.of(self.geometry, link, point, axes)
         return _floats(view.jacobian_dot(FLOATS.trig(q), qd))
 
     def determinant(self, q: Sequence[float]) -> float:

@@ -2,15 +2,16 @@
 
 Nothing of `kr16cli` is imported. The chain is a product of exponentials about joint axes read
 off the zero pose in robroot (x forward, y left, z up), or the literal matrix product of
-Table 3.1; dynamics is Lagrange's, by summing over links (3.38) and differentiating with dual
-numbers. All functions take (cos, sin) arrays of any dtype, objects such as fractions included.
+Table 3.1; dynamics is Lagrange's, by summing over links (3.38) and differentiating by complex
+step or dual numbers. All functions take (cos, sin) arrays of any dtype, fractions among them.
 
 A geometry is anything with d1 a1 a2 a3 d4 d6; a link anything with mass, com, inertia, frame.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from numbers import Number
 from typing import Any, NamedTuple
 
@@ -161,8 +162,7 @@ def axes_and_points(g: Any, moves: Sequence[Array]) -> tuple[list[Array], list[A
     """Joint axes and a point on each, robroot, for the motions of a configuration."""
     z = [move[..., :3, :3] @ axis for move, axis in zip(moves, AXES, strict=False)]
     o = [
-        move[..., :3, :3] @ p + move[..., :3, 3]
-        for move, p in zip(moves, points(g), strict=False)
+        move[..., :3, :3] @ p + move[..., :3, 3] for move, p in zip(moves, points(g), strict=False)
     ]
     return z, o
 
@@ -287,22 +287,26 @@ class Moment(NamedTuple):
 
 
 def moments(g: Any, links: Sequence[Body], c: Array, s: Array) -> list[Moment]:
-    """Every link in a configuration."""
+    """Every link in a configuration; c and s are (..., 6)."""
     moves = motions(g, c, s)
     result = []
     for i, body in enumerate(links, 1):
-        rotation = moves[i][:3, :3]
-        centre = rotation @ body.centre + moves[i][:3, 3]
+        rotation = moves[i][..., :3, :3]
+        centre = rotation @ body.centre + moves[i][..., :3, 3]
         table = jacobian(g, c, s, centre, link=i)
-        inertia = rotation @ body.inertia @ rotation.T
-        result.append(Moment(body.mass, centre, inertia, table[:3], table[3:]))
+        inertia = rotation @ body.inertia @ _transposed(rotation)
+        result.append(Moment(body.mass, centre, inertia, table[..., :3, :], table[..., 3:, :]))
     return result
+
+
+def _transposed(matrix: Array) -> Array:
+    return np.swapaxes(matrix, -1, -2)
 
 
 def mass_matrix(g: Any, links: Sequence[Body], c: Array, s: Array) -> Array:
     """M by the sum over links (3.38)."""
     return sum(
-        m.mass * (m.linear.T @ m.linear) + m.angular.T @ m.inertia @ m.angular
+        m.mass * (_transposed(m.linear) @ m.linear) + _transposed(m.angular) @ m.inertia @ m.angular
         for m in moments(g, links, c, s)
     )
 
@@ -312,29 +316,41 @@ def potential(g: Any, links: Sequence[Body], gravity: Sequence[Any], c: Array, s
     moves = motions(g, c, s)
     field = np.array(gravity)
     return -sum(
-        body.mass * (field @ (move[:3, :3] @ body.centre + move[:3, 3]))
+        body.mass * ((move[..., :3, :3] @ body.centre + move[..., :3, 3]) @ field)
         for body, move in zip(links, moves[1:], strict=True)
     )
 
 
-def mass_gradient(g: Any, links: Sequence[Body], c: Array, s: Array) -> Array:
-    """dM_ij / dq_k with k first, by dual numbers."""
-    return np.stack(
-        [eps(mass_matrix(g, links, *dual_turns(c, s, unit))) for unit in np.eye(6, dtype=int)]
-    )
+def slope(function: Callable[[Array, Array], Any], c: Array, s: Array, direction: Array) -> Array:
+    """Derivative of a function of (c, s) along a joint-space direction (..., 6), to rounding.
+
+    Complex step on floats, dual numbers on anything else (one direction only).
+    """
+    if c.dtype == object:
+        return eps(function(*dual_turns(c, s, direction)))
+    h = 1e-20j * direction
+    return np.imag(function(c - h * s, s + h * c)) / 1e-20
+
+
+def _gradient(function: Callable[[Array, Array], Any], c: Array, s: Array) -> Array:
+    """Derivatives with respect to each joint, joint first."""
+    units = np.eye(6, dtype=int)
+    if c.dtype == object:
+        return np.array([slope(function, c, s, unit) for unit in units])
+    return slope(function, c, s, units)
 
 
 def christoffel(g: Any, links: Sequence[Body], c: Array, s: Array) -> Array:
     """C_k(i, j) of (3.41), k first, with the index of the last term corrected."""
-    d = mass_gradient(g, links, c, s)  # d[i, k, j] = dM_kj / dq_i
+    d = _gradient(partial(mass_matrix, g, links), c, s)  # d[i, k, j] = dM_kj / dq_i
     return (d.transpose(1, 0, 2) + d.transpose(1, 2, 0) - d) / 2
 
 
-def gravity_torque(g: Any, links: Sequence[Body], field: Sequence[Any], c: Array, s: Array) -> Array:
-    """G = dP/dq by dual numbers."""
-    units = np.eye(6, dtype=int)
-    values = [potential(g, links, field, *dual_turns(c, s, unit)) for unit in units]
-    return np.array([v.eps for v in values])
+def gravity_torque(
+    g: Any, links: Sequence[Body], field: Sequence[Any], c: Array, s: Array
+) -> Array:
+    """G = dP/dq (3.42)."""
+    return _gradient(partial(potential, g, links, field), c, s)
 
 
 def inverse_dynamics(
@@ -475,9 +491,7 @@ class Pinocchio:
     def jacobian(self, q: Array) -> Array:
         """Flange Jacobian in robroot axes."""
         axes = self.pin.LOCAL_WORLD_ALIGNED
-        return np.array(
-            self.pin.computeFrameJacobian(self.model, self.data, q, self.flange, axes)
-        )
+        return np.array(self.pin.computeFrameJacobian(self.model, self.data, q, self.flange, axes))
 
     def jacobian_dot(self, q: Array, qd: Array) -> Array:
         """Its rate."""

@@ -108,9 +108,7 @@ REGIMES: dict[str, st.SearchStrategy[list[float]]] = {
         _q5,
     ),
     **{
-        f"near_{name}": st.builds(
-            lambda q, d, at=at: _with(q, q3=_turned(at + d)), generic, offset
-        )
+        f"near_{name}": st.builds(lambda q, d, at=at: _with(q, q3=_turned(at + d)), generic, offset)
         for name, at in _ELBOWS.items()
     },
     **{

@@ -92,7 +92,8 @@ def test_options_take_six_negative_numbers_anywhere() -> None:
         (f"dynamics {_HOME} --payload -1 0 0 0", ("mass is -1 kg",)),
         (f"dynamics {_HOME} --payload 1 0 0 0 --load-data {{M:1}}", ("exclude",)),
         (f"dynamics {_HOME} --qd 1e300 0 0 0 0 0", ("not finite", "too large")),
-        ("robot", ("Missing command",)),
+        ("robot", ("kr16 robot needs a command", "check, template")),
+        ("fk - --input x.csv", ("-", "--input", "exclude")),
         ("robot check", ("FILE",)),
     ],
 )

@@ -206,7 +206,7 @@ def test_kinematics_only_robot_goes_as_urdf_without_inertials() -> None:
 
 def test_what_needs_inertia_refuses_a_kinematics_only_robot() -> None:
     data = kr16cli.load_data("kr16_l6")
-    with pytest.raises(kr16cli.InputError, match="0 of 6 links.*export urdf"):
+    with pytest.raises(kr16cli.InputError, match=r"0 of 6 links.*export urdf"):
         mjcf(data)
     with pytest.raises(kr16cli.InputError, match="payload of 16 kg"):
         urdf(data, LOAD)

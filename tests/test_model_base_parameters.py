@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import oracles
 import pytest
-import strategies as sg
 from hypothesis import given
 
 import kr16cli
+import oracles
+import strategies as sg
 from kr16cli import Payload
 from kr16cli.model import dynamics, inertia
 from kr16cli.model.inertia import Body

@@ -6,13 +6,13 @@ import math
 from fractions import Fraction
 
 import numpy as np
-import oracles
 import pytest
-import strategies as sg
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kr16cli
+import oracles
+import strategies as sg
 from kr16cli.model import chain, forward
 from kr16cli.robot import Geometry
 
@@ -42,6 +42,7 @@ def test_closed_form_equals_the_product_of_dh_transforms(q: list[float], g: Geom
     assert np.abs(matrix(product) - matrix(forward.flange(pairs(q), g))).max() <= ULP
 
 
+@settings(max_examples=30)
 @given(rational_turns, rational_arms)
 def test_closed_form_equals_the_product_exactly(
     cs: list[tuple[Fraction, Fraction]], g: Geometry
@@ -53,6 +54,7 @@ def test_closed_form_equals_the_product_exactly(
         assert all(isinstance(v, Fraction) for v in b)
 
 
+@settings(max_examples=30)
 @given(rational_turns, rational_arms)
 def test_flange_equals_the_product_of_exponentials_exactly(
     cs: list[tuple[Fraction, Fraction]], g: Geometry
@@ -61,6 +63,7 @@ def test_flange_equals_the_product_of_exponentials_exactly(
     assert forward.flange(cs, g).rows() == oracles.flange(g, c, s).tolist()
 
 
+@settings(max_examples=30)
 @given(rational_turns, rational_arms)
 def test_every_frame_equals_the_literal_table_exactly(
     cs: list[tuple[Fraction, Fraction]], g: Geometry

@@ -6,13 +6,13 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import oracles
 import pytest
-import strategies as sg
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import kr16cli
+import oracles
+import strategies as sg
 from kr16cli.robot import Geometry
 
 DATA = kr16cli.load_data()
@@ -292,9 +292,7 @@ def _batch(regime: str, n: int) -> np.ndarray:
         q[:, 2] = sg.STRAIGHT + np.pi + gap
     elif "shoulder" in regime or "all" in regime:
         bends, sides = rng.uniform(-2.4, 2.4, n), rng.choice([-1, 1], n)
-        q = np.array(
-            [sg.on_shoulder(*a) for a in zip(q.tolist(), bends, sides, gap, strict=True)]
-        )
+        q = np.array([sg.on_shoulder(*a) for a in zip(q.tolist(), bends, sides, gap, strict=True)])
         if "all" in regime:
             q[:, 4] = rng.choice([0.0, np.pi, 1e-11, -1e-7], n)
     elif regime == "limits":

@@ -8,13 +8,13 @@ from fractions import Fraction
 from typing import Any, get_args
 
 import numpy as np
-import oracles
 import pytest
-import strategies as sg
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kr16cli
+import oracles
+import strategies as sg
 from kr16cli.model import chain, forward, jacobian
 from kr16cli.model.scalars import FLOATS
 from kr16cli.model.view import Axes, View
@@ -124,6 +124,7 @@ _turns = st.lists(
 _speeds = st.lists(st.fractions(-3, 3, max_denominator=9), min_size=6, max_size=6)
 
 
+@settings(max_examples=20)
 @given(_turns, _speeds, links)
 def test_jacobian_and_rate_equal_the_oracles_exactly(
     cs: list[tuple[Fraction, Fraction]], qd: list[Fraction], link: int
@@ -185,7 +186,11 @@ def test_determinant_of_3_37_is_the_determinant(q: list[float]) -> None:
 @given(sg.everywhere)
 def test_determinant_is_the_product_of_the_three_factors(q: list[float]) -> None:
     cs = FLOATS.trig(q)
-    factors = jacobian.wrist_factor(cs), jacobian.elbow_factor(cs, G), jacobian.shoulder_factor(cs, G)
+    factors = (
+        jacobian.wrist_factor(cs),
+        jacobian.elbow_factor(cs, G),
+        jacobian.shoulder_factor(cs, G),
+    )
     assert ARM.determinant(q) == pytest.approx(G.a2 * math.prod(factors), abs=1e-16)
 
 
@@ -204,7 +209,11 @@ def test_family_is_named_and_measured(
     """Near one family its factor vanishes with the distance, and the arm says so."""
     q = pick.draw(st.one_of(*(sg.REGIMES[name] for name in regimes)))
     found = {s.family: s for s in ARM.singularities(q)}[family]
-    reach = {"wrist": 1.0, "elbow": math.hypot(G.a3, G.d4), "shoulder": 0.94 + math.hypot(G.a3, G.d4)}
+    reach = {
+        "wrist": 1.0,
+        "elbow": math.hypot(G.a3, G.d4),
+        "shoulder": 0.94 + math.hypot(G.a3, G.d4),
+    }
     expected = {
         "wrist": math.sin(q[4]),
         "elbow": math.hypot(G.a3, G.d4) * math.sin(q[2] - sg.STRAIGHT),

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import oracles
 import pytest
-import strategies as sg
 from hypothesis import given
 from hypothesis import strategies as st
 
 import kr16cli
+import oracles
+import strategies as sg
 from kr16cli.model import orientation
 from kr16cli.model.scalars import FLOATS
 
@@ -102,9 +102,9 @@ def test_rate_matrix_dot_is_its_derivative(
 ) -> None:
     cs = list(zip(*oracles.dual_turns(*oracles.turns(angles), rates), strict=True))
     rows = [[v + oracles.Dual(0.0) for v in row] for row in orientation.rate_matrix(cs)]
-    ours = np.array(
-        orientation.rate_matrix_dot(FLOATS.trig(angles), rates), dtype=object
-    ).astype(float)
+    ours = np.array(orientation.rate_matrix_dot(FLOATS.trig(angles), rates), dtype=object).astype(
+        float
+    )
     assert np.abs(ours - oracles.eps(rows).astype(float)).max() <= 1e-14
 
 

@@ -3,35 +3,48 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from io import BytesIO
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kr16cli.queries.common import Answer, Question
 from kr16cli.robot import RobotData
 
 
-def npz_bytes(
-    question: Question, data: RobotData, answers: Sequence[Answer | None], statuses: Sequence[str]
-) -> bytes:
-    """The npz file's content; rows without an answer are NaN and say so in `status`."""
-    parts = [None if answer is None else question.arrays(answer.result) for answer in answers]
-    names = list(dict.fromkeys(name for part in parts if part for name in part))
-    arrays: dict[str, Any] = {}
-    for name in names:
-        given = [None if part is None else part.get(name) for part in parts]
-        first = next(value for value in given if value is not None)
-        array = np.full((len(given), *np.shape(first)), np.nan)
-        for i, value in enumerate(given):
-            if value is not None:
-                array[i] = value
-        arrays[name] = array
-    arrays["status"] = np.array(list(statuses), dtype=np.str_)
-    arrays["units"] = np.array(json.dumps(dict(question.units)))
-    arrays["robot"] = np.array(data.name)
-    arrays["model_sha256"] = np.array(data.sha256)
-    out = BytesIO()
-    np.savez(out, **arrays)
-    return out.getvalue()
+class NpzSink:
+    """Rows as numbers; a row without an answer is NaN and says so in `status`."""
+
+    def __init__(self, question: Question, data: RobotData) -> None:
+        self._question, self._data = question, data
+        self._rows: list[dict[str, NDArray[np.float64]] | None] = []
+        self._statuses: list[str] = []
+
+    def add(self, answer: Answer | None, status: str, reason: str | None) -> None:
+        """Take a row's numbers."""
+        given = None if answer is None else self._question.arrays(answer.result)
+        self._rows.append(given and {name: np.array(v, dtype=float) for name, v in given.items()})
+        self._statuses.append(status)
+
+    def content(self, inputs: Mapping[str, Any], warnings: Sequence[str]) -> bytes:
+        """The npz file, with units, robot, model hash and warnings as text."""
+        shapes = {name: v.shape for row in self._rows if row for name, v in row.items()}
+        arrays: dict[str, Any] = {}
+        for name, shape in shapes.items():
+            arrays[name] = np.full((len(self._rows), *shape), np.nan)
+            for i, row in enumerate(self._rows):
+                if row and name in row:
+                    arrays[name][i] = row[name]
+        arrays["status"] = np.array(self._statuses, dtype=np.str_)
+        for name, text in (
+            ("units", json.dumps(self._question.units)),
+            ("robot", self._data.name),
+            ("model_sha256", self._data.sha256),
+            ("warnings", "\n".join(warnings)),
+        ):
+            arrays[name] = np.array(text)
+        out = BytesIO()
+        np.savez(out, **arrays)
+        return out.getvalue()

@@ -28,6 +28,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if "--debug" in arguments:
         arguments.remove("--debug")
         debug = True
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a name may not fit the terminal
     try:
         code = _run(arguments)
         if sys.stdout is not None:
@@ -53,7 +55,12 @@ def _explained(error: Exception) -> tuple[str, int]:
     if isinstance(error, OSError):
         return f"{error.filename or 'standard output'}: {error.strerror or error}", _USAGE
     if hasattr(error, "format_message"):  # typer's own usage errors
-        return str(error.format_message()), _USAGE
+        text, ctx = str(error.format_message()), getattr(error, "ctx", None)
+        if text == "Missing command." and ctx is not None:
+            text = (
+                f"{ctx.command_path} needs a command: {', '.join(ctx.command.list_commands(ctx))}"
+            )
+        return text, _USAGE
     kind, text = type(error).__name__, " ".join(str(error).split())
     return f"this is our bug: {kind}: {text}; --debug shows where", _OUR_BUG
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from kr16cli.cli import motion, run, values
+from kr16cli.cli import batch, run, values
 from kr16cli.cli import options as o
 from kr16cli.cli import output as out
 from kr16cli.cli.command import Command, LeanGroup, new_app
@@ -18,7 +18,6 @@ app = new_app(cls=LeanGroup)
 def export() -> None:
     """Write the robot as URDF (ROS, Pinocchio, ...) or MJCF (MuJoCo).
 
-    \b
     $ kr16 export urdf -o kr16.urdf
     $ kr16 export mjcf -o kr16.xml
     """
@@ -31,14 +30,13 @@ def urdf(
 ) -> None:  # fmt: skip
     """URDF. What it cannot say is told on stderr.
 
-    \b
     $ kr16 export urdf -o kr16.urdf
     $ kr16 export urdf --payload 16 0 0 120
     """
     with out.Target(output) as target:
         data, load = run.load(ctx), values.payload(payload, load_data, si=si)
         target.write(ur.urdf(data, load, drives))
-        motion.warn(ur.notes(data, drives))
+        batch.warn(ur.notes(data, drives))
 
 
 @app.command(cls=Command)
@@ -49,11 +47,10 @@ def mjcf(
 ) -> None:  # fmt: skip
     """MJCF, with the gravity of the parameter file or another.
 
-    \b
     $ kr16 export mjcf -o kr16.xml
     $ kr16 export mjcf --drives --gravity 0 0 0
     """
     with out.Target(output) as target:
         data, load = run.load(ctx), values.payload(payload, load_data, si=si)
         target.write(mj.mjcf(data, load, drives, values.option(gravity, "XYZ", "--gravity")))
-        motion.warn(mj.notes(data, drives))
+        batch.warn(mj.notes(data, drives))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from kr16cli.cli import batch, render, values
 from kr16cli.cli import output as out
-from kr16cli.cli import render, values
 from kr16cli.errors import CheckFailedError
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ _SIX = ("1", "2", "3", "4", "5", "6")
 
 Scene = Annotated[
     str | None,
-    typer.Argument(metavar="[SCENARIO]", help="A scenario file, or a shipped one: free_swing."),
+    typer.Argument(metavar="SCENARIO", help="A scenario file, or a shipped one: free_swing."),
 ]
 Q = Annotated[
     str | None,
@@ -41,7 +42,12 @@ OutputStep = Annotated[
     str | None, typer.Option("--output-step", metavar="S", help="Time between samples, 0.01 s.")
 ]
 Method = Annotated[
-    str | None, typer.Option("--method", metavar="NAME", help="DOP853, RK45, Radau or LSODA.")
+    str | None,
+    typer.Option(
+        "--method",
+        metavar="NAME",
+        help="auto, DOP853, RK45, Radau or LSODA; auto is DOP853, with --drives LSODA.",
+    ),
 ]
 Rtol = Annotated[
     str | None, typer.Option("--rtol", metavar="X", help="Relative tolerance of a step, 1e-9.")
@@ -96,22 +102,23 @@ def simulate(p: Mapping[str, Any], data: RobotData, asked: Scenario) -> None:
     Raises:
         CheckFailedError: the solver failed; what there is of the run is written first.
     """
-    json, file = bool(p["json"]), p["output"] not in (None, "-")
-    kind = out.choose_format(p["format_"], json and not file, p["output"])
+    file = p["output"] not in (None, "-")
+    record = file and (p["format_"] or Path(p["output"]).suffix[1:]).lower() in ("csv", "npz")
+    kind = out.choose_format(p["format_"], p["json"] and not record, p["output"])
     with out.Target(p["output"]) as target:
         from kr16cli.simulate.experiment import simulate as experiment
         from kr16cli.simulate.summary import envelope
 
         run = experiment(data, asked, on_step=_progress(asked.duration))
         answer = envelope(run, data)
-        texts = {
+        texts: dict[str, Callable[[], str | bytes]] = {
             "csv": run.to_csv, "npz": run.to_npz,
             "json": lambda: render.json_text(answer), "table": lambda: table(answer, si=p["si"]),
         }  # fmt: skip
         target.write(texts[kind]())
-        if file and kind in ("csv", "npz"):
-            out.Target(None).write(texts["json" if json else "table"]())
-    warn(answer["warnings"])
+        if record:
+            out.Target(None).write(texts["json" if p["json"] else "table"]())
+    batch.warn(answer["warnings"])
     if run.failure:
         raise CheckFailedError(_failed(answer["result"]))
 
@@ -139,15 +146,16 @@ def table(answer: Mapping[str, Any], *, si: bool = False) -> str:
         turned = numbers if si else [units.deg(v) for v in numbers]
         return [render.shown(v, of) for v in turned]
 
+    def torques(numbers: Sequence[float]) -> list[str]:
+        return [f"{round(v, 3) + 0.0:.3f}" for v in numbers]
+
     joints = zip(
         far["joint"], column(final["q"], unit), column(far["q_min"], unit),
         column(far["q_max"], unit), column(final["qd"], unit), column(far["qd_max"], unit),
-        [render.shown(v) for v in final["tau"]], [render.shown(v) for v in far["tau_max"]],
+        torques(final["tau"]), torques(far["tau_max"]),
         strict=True,
     )  # fmt: skip
-    header = [
-        "", f"q {unit}", "min", "max", f"qd {unit}/s", "largest", "tau N m", "largest",
-    ]  # fmt: skip
+    header = ["", f"q {unit}", "min", "max", f"qd {unit}/s", "largest", "tau N m", "largest"]
     x, y, z, *abc = final["pose"]
     place = [v if si else units.mm(v) for v in (x, y, z)]
     length = "m" if si else "mm"
@@ -171,12 +179,6 @@ def table(answer: Mapping[str, Any], *, si: bool = False) -> str:
             "",
         ]
     )
-
-
-def warn(texts: Sequence[str]) -> None:
-    """Warnings on stderr, one a line."""
-    for text in texts:
-        print(f"kr16: warning: {' '.join(text.split())}", file=sys.stderr)
 
 
 def _progress(duration: float) -> Callable[[float], None]:

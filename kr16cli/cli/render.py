@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 Cell = Any
@@ -10,44 +10,54 @@ Cell = Any
 _DECIMALS = {"mm": 3, "deg": 4, "m": 6, "rad": 6}
 
 
-def json_text(envelope: Mapping[str, Any]) -> str:
-    """The envelope as JSON: full precision, one entry of `result` and one row per line."""
+class Encoded(list[str]):
+    """A list whose items are JSON already."""
+
+
+def json_line(value: Any) -> str:
+    """A value as JSON on one line; full precision, NaN refused."""
     import json
 
-    def line(value: Any) -> str:
-        return json.dumps(value, allow_nan=False, ensure_ascii=False)
+    return json.dumps(value, allow_nan=False)
+
+
+def json_text(envelope: Mapping[str, Any]) -> str:
+    """The envelope as JSON, one entry of `result` and one row per line."""
 
     def block(value: Any, indent: str) -> str:
         if isinstance(value, dict) and value and len(indent) < 4:
-            inner = ",\n".join(
-                f"{indent}  {line(key)}: {block(item, indent + '  ')}"
-                for key, item in value.items()
-            )
-            return f"{{\n{inner}\n{indent}}}"
+            inner = (f"{json_line(key)}: {block(v, indent + '  ')}" for key, v in value.items())
+            return _enclosed("{}", inner, indent)
+        if isinstance(value, Encoded):
+            return _enclosed("[]", value, indent)
         if isinstance(value, list) and value and isinstance(value[0], (dict, list)):
-            inner = ",\n".join(f"{indent}  {line(item)}" for item in value)
-            return f"[\n{inner}\n{indent}]"
-        return line(value)
+            return _enclosed("[]", map(json_line, value), indent)
+        return json_line(value)
 
     return block(dict(envelope), "") + "\n"
 
 
-def csv_text(rows: Sequence[Mapping[str, Cell]]) -> str:
-    """Rows as CSV with a header of all their columns; full precision, missing cells empty."""
+def _enclosed(brackets: str, items: Iterable[str], indent: str) -> str:
+    inner = ",\n".join(f"{indent}  {item}" for item in items)
+    return f"{brackets[0]}\n{inner}\n{indent}{brackets[1]}" if inner else brackets
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A CSV file of cells that are text already."""
     import csv
     from io import StringIO
 
-    columns = list(dict.fromkeys(name for row in rows for name in row))
     out = StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(columns)
-    for row in rows:
-        cells = (row.get(name) for name in columns)
-        writer.writerow(["" if cell is None else _exact(cell) for cell in cells])
+    writer.writerow(header)
+    writer.writerows(rows)
     return out.getvalue()
 
 
-def _exact(cell: Cell) -> str:
+def exact(cell: Cell) -> str:
+    """A cell of a CSV file: full precision, never -0, empty where there is nothing."""
+    if cell is None:
+        return ""
     if isinstance(cell, bool):
         return "yes" if cell else "no"
     return repr(cell + 0.0) if isinstance(cell, float) else str(cell)
@@ -109,11 +119,3 @@ def _quiet(value: float | None, largest: float) -> float | None:
     if value is None or abs(value) < 1e-14 * largest:
         return None if value is None else 0.0
     return float(value)
-
-
-def batch_table(rows: Sequence[Mapping[str, Cell]], units: Mapping[str, str]) -> str:
-    """Rows of a batch under column names with units."""
-    columns = list(dict.fromkeys(name for row in rows for name in row if name != "units"))
-    header = [f"{name} {units[name]}" if name in units else name for name in columns]
-    cells = [[shown(row.get(name), units.get(name)) for name in columns] for row in rows]
-    return "\n".join(grid(header, cells, indent="")) + "\n"

@@ -32,10 +32,14 @@ class Row(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """The rows of a file, what it is called in messages, and warnings about it."""
+    """The rows of a file, to be taken once, and what the file is called in messages.
+
+    `expected` is about how many rows there are; `warnings` are about the file as a whole.
+    """
 
     name: str
-    rows: list[Row]
+    rows: Iterator[Row]
+    expected: int
     warnings: list[str]
 
 
@@ -59,7 +63,7 @@ def read(source: str, needed: str, optional: Sequence[str] = ()) -> Batch:
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(name, f"cannot be read: {reason}") from None
     if content.startswith(_NPZ_MAGIC):
-        return Batch(name, _npz_rows(content, name, needed, optional), [])
+        return _npz_batch(content, name, needed, optional)
     return _csv_batch(content, name, needed, optional)
 
 
@@ -74,18 +78,26 @@ def _csv_batch(content: bytes, name: str, needed: str, optional: Sequence[str]) 
     if not first:
         raise FileError(name, f"is empty; it needs a header {','.join(GROUPS[needed])}")
     delimiter = next((mark for mark in (";", "\t") if mark in first), ",")
-    lines = csv.reader(StringIO(text, newline=""), delimiter=delimiter, skipinitialspace=True)
-    try:
-        table = [line for line in lines if line]
-    except csv.Error as error:
-        raise FileError(name, f"line {lines.line_num}: no CSV: {error}") from None
-    header = [cell.strip().lower() for cell in table[0]]
+    lines = _lines(
+        csv.reader(StringIO(text, newline=""), delimiter=delimiter, skipinitialspace=True), name
+    )
+    header = [cell.strip().lower() for cell in next(lines)]
     taken = _columns(header, name, needed, optional)
     extra = [cell for cell in header if cell and cell not in _OWN]
     warnings = [f"{name}: columns not used: {', '.join(extra)}"] if extra else []
     comma = delimiter != ","
-    rows = [_csv_row(cells, len(header), taken, decimal_comma=comma) for cells in table[1:]]
-    return Batch(name, rows, warnings)
+    rows = (_csv_row(cells, len(header), taken, decimal_comma=comma) for cells in lines)
+    return Batch(name, rows, text.count("\n"), warnings)
+
+
+def _lines(reader: Any, name: str) -> Iterator[list[str]]:
+    """Lines of a CSV file that are not blank; FileError where it is none."""
+    import csv
+
+    try:
+        yield from (line for line in reader if line)
+    except csv.Error as error:
+        raise FileError(name, f"line {reader.line_num}: no CSV: {error}") from None
 
 
 def _columns(
@@ -133,7 +145,7 @@ def _csv_row(
         return Row({}, str(error))
 
 
-def _npz_rows(content: bytes, name: str, needed: str, optional: Sequence[str]) -> list[Row]:
+def _npz_batch(content: bytes, name: str, needed: str, optional: Sequence[str]) -> Batch:
     import numpy as np
 
     keys = {"q": "q", "pose": "T"}
@@ -162,7 +174,7 @@ def _npz_rows(content: bytes, name: str, needed: str, optional: Sequence[str]) -
     for group, array in arrays.items():
         if len(array) != count:
             raise FileError(name, f"{group} has {len(array)} rows, {needed} has {count}")
-    return list(_array_rows(arrays, count, needed))
+    return Batch(name, _array_rows(arrays, count, needed), count, [])
 
 
 def _array_rows(arrays: Mapping[str, Any], count: int, needed: str) -> Iterator[Row]:

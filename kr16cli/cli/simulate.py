@@ -40,13 +40,12 @@ def simulate(
 ) -> None:
     """Simulate a motion: a scenario file, a shipped scenario, or options.
 
-    \b
     $ kr16 simulate free_swing -o swing.npz
     $ kr16 simulate --q 0 -60 60 0 30 0 --duration 0.5 --torque gravity --json
 
-    Options go before the scenario's values. CSV and npz hold every sample in SI units; the
-    summary goes to stdout. Joint limits are reported, not enforced. Ends with 1 if the solver
-    fails; what there is of the run is then written and marked.
+    An option replaces the scenario's value. CSV and npz hold every sample, in SI units; the
+    summary goes to stdout. Joint limits are reported, not enforced. If the solver fails, the
+    run so far is written and marked, and the exit code is 1.
     """
     asked = m.scenario(ctx.params)
     if asked is None:

@@ -65,7 +65,8 @@ def notes(data: RobotData, drives: bool = False) -> list[str]:
 
 def _bodies(parts: Tree, drives: bool) -> list[str]:
     """The six bodies, each inside the one before, with the flange in the last."""
-    opening, closing = [], []
+    opening: list[str] = []
+    closing: list[str] = []
     for depth, segment in enumerate(parts.segments, 3):
         pad = "  " * depth
         opening.append(f'{pad}<body name="{segment.name}" pos="{numbers(segment.origin)}">')

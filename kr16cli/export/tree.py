@@ -73,9 +73,7 @@ def tree(data: RobotData, payload: Payload | None = None) -> Tree:
     flange = flange_of_frame6(at_zero[6])
     inertials: list[Inertial | None] = [None] * 6
     if data.links:
-        bodies = [
-            _body(link, at_zero[i + 1], turning[i].p) for i, link in enumerate(data.links)
-        ]
+        bodies = [_body(link, at_zero[i + 1], turning[i].p) for i, link in enumerate(data.links)]
         inertials = [_own(link, body) for link, body in zip(data.links, bodies, strict=True)]
         if payload is not None and payload.mass:
             load = body_about(payload.mass, payload.com, payload.inertia)
@@ -113,9 +111,7 @@ def _inertial(body: Body) -> Inertial:
     """A body about its mass centre."""
     centre = scale(1.0 / body.m, body.h)
     # Steiner: J_origin - m (c.c 1 - c c^T) = J_origin + m [c]x [c]x, column by column.
-    columns = [
-        add(body.times(e), scale(body.m, cross(centre, cross(centre, e)))) for e in _UNIT
-    ]
+    columns = [add(body.times(e), scale(body.m, cross(centre, cross(centre, e)))) for e in _UNIT]
     six = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     inertia = cast("Inertia6", tuple(float(columns[j][i]) + 0.0 for i, j in six))
     return Inertial(float(body.m), _vector(centre), inertia)

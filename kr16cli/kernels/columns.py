@@ -57,10 +57,11 @@ class Engine:
             gathered = np.empty((width, min(CHUNK, n)))
             for lo in part:
                 hi = min(lo + CHUNK, n)
-                for row, column in zip(
-                    gathered, kernel(*(_columns(source, lo, hi) for source in inputs)), strict=True
-                ):
-                    row[: hi - lo] = column
+                columns = (_columns(source, lo, hi) for source in inputs)
+                # Lanes that a `where` discards, and poses far out of reach, may overflow.
+                with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                    for row, column in zip(gathered, kernel(*columns), strict=True):
+                        row[: hi - lo] = column
                 out[lo:hi] = gathered[:, : hi - lo].T
 
         if threads <= 1 or len(starts) <= 1:

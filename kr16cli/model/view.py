@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
+from kr16cli.errors import InputError
 from kr16cli.model import chain, forward, jacobian
 from kr16cli.model.chain import Frame
 from kr16cli.model.scalars import ZERO, Scalar, Trig, Vector
@@ -25,6 +26,15 @@ class View(NamedTuple):
     link: int = 6
     point: Sequence[Scalar] | None = None
     axes: Axes = "robroot"
+
+    @classmethod
+    def of(cls, geometry: Geometry, link: int, point: Sequence[Scalar] | None, axes: str) -> View:
+        """A view with checked choices; InputError names the wrong one."""
+        if link not in range(1, 7):
+            raise InputError(f"link is {link}; expected 1 to 6")
+        if axes not in get_args(Axes):
+            raise InputError(f"axes is {axes!r}; expected one of {', '.join(get_args(Axes))}")
+        return cls(geometry, link, point, axes)  # type: ignore[arg-type]  # checked above
 
     def jacobian(self, cs: Trig) -> Rows:
         """6x6, linear rows first (m, rad)."""

@@ -62,6 +62,20 @@ class Question(ABC):
     def arrays(self, result: Mapping[str, Any]) -> dict[str, Any]:
         """Arrays of a result for npz, as nested lists."""
 
+    def envelope(
+        self, inputs: Mapping[str, Any], result: Mapping[str, Any], warnings: Sequence[str]
+    ) -> dict[str, Any]:
+        """A result in the envelope that all commands share."""
+        return {
+            "schema": f"kr16.{self.name}/1",
+            "robot": self.data.name,
+            "model_sha256": self.data.sha256,
+            "units": self.units,
+            "input": inputs,
+            "result": result,
+            "warnings": list(warnings),
+        }
+
     @property
     def csv_units(self) -> str:
         """The units of a CSV row in a word or two."""

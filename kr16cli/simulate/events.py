@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +17,6 @@ Dense = Callable[[Array], Array]
 
 _PARTS = 8
 """Parts of a step between which turning points are looked for."""
-
-KINDS = tuple(f"{what}_{side}" for side in ("lower", "upper") for what in ("outside", "leave", "return"))
 
 
 class Event(NamedTuple):
@@ -74,7 +73,7 @@ class LimitWatch:
         joint = self._joints[i]
         turning = [
             _root(dense, 6 + i, 0.0, a, b)
-            for a, b in zip(times, times[1:], strict=False)
+            for a, b in pairwise(times)
             if dense(a)[6 + i] * dense(b)[6 + i] < 0.0
         ]
         nodes = np.unique([*times, *turning])

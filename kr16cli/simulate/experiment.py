@@ -46,7 +46,7 @@ def simulate(
     start = np.array([*scenario.q, *scenario.qd, 0.0, 0.0])
     weights = np.array([1.0] * 12 + [WORK_TOLERANCE] * 2)
     integration = Integration(
-        Plant(arm, torque), scenario.solver, weights, LimitWatch(data.joints), on_step
+        Plant(arm, torque), scenario.solver_used(), weights, LimitWatch(data.joints), on_step
     )
     times = sample_times(scenario.duration, scenario.output_step)
     return _record(data, scenario, robot, torque, integration.run(start, times, torque.breaks))

@@ -45,7 +45,7 @@ class Solution:
 def sample_times(duration: float, step: float) -> Array:
     """Multiples of `step` (s) from 0, and the duration (s) itself, exactly, as the last."""
     count = int(np.floor(duration / step * (1.0 + 1e-12)))
-    times = np.arange(count + 1) * step
+    times: Array = np.arange(count + 1, dtype=np.float64) * step
     if duration - times[-1] > 1e-9 * step:
         return np.append(times, duration)
     times[-1] = duration
@@ -111,11 +111,12 @@ class Integration:
                     break
                 failure = _advance(stepper)
                 if failure is None:
+                    t, y = float(stepper.t), stepper.y.copy()
                     self._steps += 1
                     self._record(stepper, times, samples)
-                    self._on_step(float(stepper.t))
+                    self._on_step(t)
         self._evaluations += int(stepper.nfev)
-        return float(stepper.t), stepper.y.copy(), failure
+        return t, y, failure
 
     def _record(self, stepper: Any, times: Array, samples: list[Array]) -> None:
         """Samples and events of the step just made."""

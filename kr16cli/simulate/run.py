@@ -76,7 +76,8 @@ class Run:
     def drift(self) -> Array:
         """(n,) J: change of energy that no work explains; the integration's error."""
         energy = self.energy_kinetic + self.energy_potential
-        return energy - energy[0] - (self.work_torque - self.work_friction)
+        unexplained: Array = energy - energy[0] - (self.work_torque - self.work_friction)
+        return unexplained
 
     def metadata(self) -> dict[str, Any]:
         """What the arrays do not say, JSON-ready."""
@@ -139,7 +140,7 @@ def load_run(path: str | Path) -> Run:
         FileError: the file cannot be read or holds no run.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: np.asarray(archive[name], dtype=np.float64) for name in UNITS}
             events = [Event(*record) for record in archive["events"].tolist()]
             about = json.loads(str(archive["metadata"]))

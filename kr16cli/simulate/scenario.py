@@ -37,11 +37,12 @@ class TorqueSpec:
 class SolverSpec:
     """How the equations of motion are integrated.
 
-    `method` is one of SciPy's solvers; `rtol` and `atol` (rad, rad/s) bound the error of a
-    step; more than `max_steps` steps end the run as failed.
+    `method` is one of SciPy's solvers; "auto" is DOP853, or LSODA with drives: their friction
+    makes joints nearly at rest stiff, and an explicit method slow. `rtol` and `atol` (rad,
+    rad/s) bound the error of a step; more than `max_steps` steps end the run as failed.
     """
 
-    method: str = "DOP853"
+    method: str = "auto"
     rtol: float = 1e-9
     atol: float = 1e-10
     max_steps: int = 100_000
@@ -67,6 +68,12 @@ class Scenario:
     solver: SolverSpec = SolverSpec()
     description: str = ""
     folder: Path = field(default=Path(), compare=False)
+
+    def solver_used(self) -> SolverSpec:
+        """The solver with a method by name in place of "auto"."""
+        if self.solver.method != "auto":
+            return self.solver
+        return replace(self.solver, method="LSODA" if self.drives else "DOP853")
 
     def describe(self) -> dict[str, Any]:
         """The scenario as a JSON-ready table in SI units; what is None is left out."""
@@ -122,7 +129,7 @@ def with_options(
 
 def _same(key: str, others: Mapping[str, Any]) -> bool:
     """Whether a quantity is among others, in whatever unit: q and q_deg, qd and qd_deg_s."""
-    return key.split("_deg")[0] in {other.split("_deg")[0] for other in others}
+    return key.partition("_deg")[0] in {other.partition("_deg")[0] for other in others}
 
 
 def parse_scenario(table: Mapping[str, Any], path: str, folder: Path = Path()) -> Scenario:
@@ -222,4 +229,3 @@ def _lists(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _lists(item) for key, item in value.items()}
     return [_lists(item) for item in value] if isinstance(value, tuple) else value
-

@@ -11,11 +11,11 @@ from typing import Any, cast
 
 from kr16cli.errors import ParameterError
 from kr16cli.robot import Inertia6
-from kr16cli.robot_check import _Checker
+from kr16cli.robot_check import Checker
 from kr16cli.robot_rules import GRAVITY, INERTIA, LENGTH, MASS, Quantity, inertia_problem
 
 SCHEMA = "kr16.scenario/1"
-METHODS = ("DOP853", "RK45", "Radau", "LSODA")
+METHODS = ("auto", "DOP853", "RK45", "Radau", "LSODA")
 KINDS = ("zero", "constant", "gravity", "csv")
 MOST_SAMPLES = 1_000_000
 DEFAULT_STEP = 0.01
@@ -49,7 +49,7 @@ def problems_in(table: Mapping[str, Any], path: str) -> list[ParameterError]:
     return checker.found
 
 
-class _ScenarioChecker(_Checker):
+class _ScenarioChecker(Checker):
     """Collects problems; every method takes the dotted key of what it looks at."""
 
     def scenario(self, table: Mapping[str, Any]) -> None:

@@ -12,7 +12,8 @@ from kr16cli.simulate.run import UNITS, Run
 from kr16cli.units import deg
 
 SCHEMA = "kr16.simulate/1"
-_PARTS = {"drift": "J", "value": "rad", **UNITS}
+_FINAL = ("time", "q", "qd", "qdd", "tau", "pose")
+_UNITS = {"drift": "J", "value": "rad", **UNITS}
 
 
 def envelope(run: Run, data: RobotData) -> dict[str, Any]:
@@ -21,7 +22,7 @@ def envelope(run: Run, data: RobotData) -> dict[str, Any]:
         "schema": SCHEMA,
         "robot": run.robot,
         "model_sha256": run.model_sha256,
-        "units": _PARTS,
+        "units": _UNITS,
         "input": dict(run.scenario),
         "result": summarise(run, data),
         "warnings": warnings(run, data),
@@ -38,7 +39,7 @@ def summarise(run: Run, data: RobotData) -> dict[str, Any]:
         "failure": run.failure,
         "duration": float(run.time[-1]),
         "samples": len(run.time),
-        "final": {k: _plain(getattr(run, k)[-1]) for k in ("time", "q", "qd", "qdd", "tau", "pose")},
+        "final": {key: _plain(getattr(run, key)[-1]) for key in _FINAL},
         "energy": {
             "kinetic_initial": _plain(run.energy_kinetic[0]),
             "kinetic_final": _plain(run.energy_kinetic[-1]),
@@ -75,8 +76,8 @@ def warnings(run: Run, data: RobotData) -> list[str]:
             at, kind = mine[0].time, mine[0].kind.split("_")[1]
             limit, worst = (joint.lower, low) if kind == "lower" else (joint.upper, high)
             texts.append(
-                f"{joint.name} is beyond its {kind} limit of {deg(limit):g} deg from {at:.4g} s on, "
-                f"at {deg(float(worst)):.4g} deg at the farthest; limits are reported, not enforced"
+                f"{joint.name} passes its {kind} limit of {deg(limit):g} deg at {at:.4g} s and "
+                f"reaches {deg(float(worst)):.4g} deg; limits are reported, not enforced"
             )
         if joint.speed is not None and speed > joint.speed:
             texts.append(

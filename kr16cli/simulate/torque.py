@@ -7,6 +7,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from io import StringIO
+from itertools import pairwise
 from pathlib import Path
 from typing import Protocol
 
@@ -71,15 +72,13 @@ class Table:
         self.times, self.rows = list(times), [tuple(row) for row in rows]
         self._slopes = [
             tuple((b - a) / (t1 - t0) for a, b in zip(low, high, strict=True))
-            for t0, t1, low, high in zip(
-                self.times, self.times[1:], self.rows, self.rows[1:], strict=False
-            )
+            for (t0, t1), (low, high) in zip(pairwise(self.times), pairwise(self.rows), strict=True)
         ]
         flat = (0.0,) * 6
         slopes = [flat, *self._slopes, flat]
         self.breaks: Sequence[float] = [
             t
-            for t, before, after in zip(self.times, slopes, slopes[1:], strict=True)
+            for t, (before, after) in zip(self.times, pairwise(slopes), strict=True)
             if not all(math.isclose(a, b, rel_tol=1e-9) for a, b in zip(before, after, strict=True))
         ]
 
