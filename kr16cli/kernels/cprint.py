@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from kr16cli.kernels.trace import Node, needed
@@ -61,7 +62,7 @@ def _name(node: Node) -> str:
 
 
 def _literal(value: float) -> str:
-    if value != value:
+    if math.isnan(value):
         return "NAN"
     text = repr(value)
     return f"({text})" if value < 0 else text

@@ -1,7 +1,8 @@
-"""The robot's numbers as one flat vector: how kernels are told which robot they serve."""
+"""The robot's numbers as the model takes them, and as the one flat vector that C kernels take."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,9 +17,16 @@ _BASE_FIRST = ("hx", "hy", "zz")
 _BASE = ("hx", "hy", "xx", "zz", "xy", "xz", "yz")
 _FULL = ("m", "hx", "hy", "hz", "xx", "yy", "zz", "xy", "xz", "yz")
 
+COUNT = 6 + 3 + 38 + 6 + 60 + 6 + 6
+"""Length of the flat vector."""
+
 
 class Parameters(NamedTuple):
-    """What the model functions take, in scalars of any kind."""
+    """What the model functions take, in scalars of any kind.
+
+    `base` are regrouped bodies, `full` the links themselves; both empty for a robot without
+    inertial data. `coulomb` and `viscous` are empty without drives.
+    """
 
     geometry: Geometry
     gravity: Sequence[Scalar]
@@ -29,39 +37,39 @@ class Parameters(NamedTuple):
     viscous: Sequence[Scalar]
 
 
-def _field(body: Body, name: str) -> Scalar:
-    return body.h["xyz".index(name[1])] if name[0] == "h" else getattr(body, name)
-
-
-def _body(names: Sequence[str], values: Sequence[Scalar]) -> Body:
-    known = dict(zip(names, values, strict=True))
-    h = tuple(known.get(f"h{axis}", ZERO) for axis in "xyz")
-    return Body(
-        known.get("m", ZERO), (h[0], h[1], h[2]), *(known.get(n, ZERO) for n in EMPTY._fields[2:])
+def parameters(arm: Arm) -> Parameters:
+    """The numbers of a robot as floats, exact zeros structural."""
+    dynamic = bool(arm.data.links)
+    joints = arm.data.joints if arm.drives else ()
+    return Parameters(
+        arm.geometry,
+        arm.gravity_vector,
+        arm.base_bodies if dynamic else (),
+        arm.rotors,
+        arm.bodies if dynamic else (),
+        [j.coulomb or 0.0 for j in joints],
+        [j.viscous or 0.0 for j in joints],
     )
 
 
-def pack(arm: Arm) -> list[float]:
-    """The vector of a robot; inertial numbers are NaN where the file has none."""
-    g = arm.geometry
-    known = bool(arm.data.links)
-    base = arm.base_bodies if known else ()
-    full = arm.bodies if known else ()
-    values: list[Scalar] = [*g, *arm.data.gravity]
+def pack(k: Parameters) -> list[float]:
+    """The flat vector; inertial numbers are NaN where the robot has none."""
+    values: list[Scalar] = [*k.geometry, *k.gravity]
     for i in range(6):
-        names = _BASE if i else _BASE_FIRST
-        values += [_field(base[i], n) if known else float("nan") for n in names]
-    values += arm.rotors
+        values += _fields(k.base, i, _BASE if i else _BASE_FIRST)
+    values += k.rotors
     for i in range(6):
-        values += [_field(full[i], n) if known else float("nan") for n in _FULL]
-    drives = arm.data.joints if arm.drives else ()
-    values += [j.coulomb or 0.0 for j in drives] or [0.0] * 6
-    values += [j.viscous or 0.0 for j in drives] or [0.0] * 6
+        values += _fields(k.full, i, _FULL)
+    values += k.coulomb or [0.0] * 6
+    values += k.viscous or [0.0] * 6
     return [float(v) for v in values]
 
 
-def unpack(values: Sequence[Scalar], *, vertical: bool = False) -> Parameters:
-    """The same as the model's arguments; `vertical` makes gravity's x and y structural zeros."""
+def unpack(values: Sequence[Scalar], *, vertical: bool, drives: bool) -> Parameters:
+    """The flat vector (numbers or symbols) as the model takes it.
+
+    `vertical` makes gravity's x and y structural zeros; without `drives` there is no friction.
+    """
     rest = iter(values)
 
     def take(count: int) -> list[Scalar]:
@@ -71,10 +79,26 @@ def unpack(values: Sequence[Scalar], *, vertical: bool = False) -> Parameters:
     base = [_body(names, take(len(names))) for names in (_BASE_FIRST, *(_BASE,) * 5)]
     rotors = take(6)
     full = [_body(_FULL, take(10)) for _ in range(6)]
-    if vertical:
-        gravity = [ZERO, ZERO, gravity[2]]
-    return Parameters(geometry, gravity, base, rotors, full, take(6), take(6))
+    coulomb, viscous = take(6), take(6)
+    return Parameters(
+        geometry,
+        [ZERO, ZERO, gravity[2]] if vertical else gravity,
+        base,
+        rotors,
+        full,
+        coulomb if drives else (),
+        viscous if drives else (),
+    )
 
 
-COUNT = 6 + 3 + 38 + 6 + 60 + 6 + 6
-"""Length of the vector."""
+def _fields(bodies: Sequence[Body], i: int, names: Sequence[str]) -> list[Scalar]:
+    if not bodies:
+        return [math.nan] * len(names)
+    b = bodies[i]
+    return [b.h["xyz".index(n[1])] if n[0] == "h" else getattr(b, n) for n in names]
+
+
+def _body(names: Sequence[str], values: Sequence[Scalar]) -> Body:
+    known = dict(zip(names, values, strict=True))
+    x, y, z = (known.get(f"h{axis}", ZERO) for axis in "xyz")
+    return Body(known.get("m", ZERO), (x, y, z), *(known.get(n, ZERO) for n in EMPTY._fields[2:]))

@@ -79,7 +79,7 @@ class Graph:
         numbers = tuple(a.number for a in args)
         if op in COMMUTATIVE:
             numbers = tuple(sorted(numbers))
-        key = (op, numbers, math.copysign(1.0, value), "nan" if value != value else value)
+        key = (op, numbers, math.copysign(1.0, value), "nan" if math.isnan(value) else value)
         found = self._known.get(key)
         if found is None:
             found = self._known[key] = Node(self, len(self.nodes), op, args, value)
@@ -113,13 +113,10 @@ class Graph:
             return self._fold(op, a.value, b.value)
         if op in ("mul", "div"):
             return self._product(op, a, b)
-        if op == "add":
-            if b.op == "neg":
-                return self.binary("sub", a, b.args[0])
-            if a.op == "neg":
-                return self.binary("sub", b, a.args[0])
-        if op == "sub" and b.op == "neg":
-            return self.binary("add", a, b.args[0])
+        if op == "add" and a.op == "neg":
+            op, a, b = "sub", b, a.args[0]
+        elif op in ("add", "sub") and b.op == "neg":
+            op, b = ("sub" if op == "add" else "add"), b.args[0]
         return self.node(op, a, b)
 
     def _product(self, op: str, a: Node, b: Node) -> Node:

@@ -8,8 +8,8 @@
 #endif
 
 #define LANES KR16_LANES
-#define MAX_ROWS 48      /* input rows: twice the angles, and the columns */
-#define MAX_RESULTS 160  /* result rows and guards of the widest kernel */
+#define MAX_ROWS KR16_MAX_ROWS
+#define MAX_RESULTS KR16_MAX_RESULTS
 #define MAX_THREADS 64
 
 void kr16_sincos_rows(const double *angles, double *rows, int count);

@@ -10,6 +10,10 @@ extern const kr16_kernel kr16_batch_kernels[];
 extern const kr16_kernel kr16_single_kernels[];
 extern const int kr16_parameter_count;
 
+/* Rows a tile has room for; the module refuses to load if a kernel needs more. */
+#define KR16_MAX_ROWS 32     /* inputs: twice the angles, and the columns */
+#define KR16_MAX_RESULTS 224 /* results and guards */
+
 enum kr16_verdict { KR16_FINE = 0, KR16_BAD_INPUT = 1 };
 
 /* Inputs are row-major (n, count); NULL stands for zeros (angles) in a group. Results are

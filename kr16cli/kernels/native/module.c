@@ -83,6 +83,12 @@ static PyObject *kernel_call(PyObject *self, PyObject *const *args, size_t flags
         n *= shape[i] = PyArray_DIM(first, i);
     memcpy(shape + lead, k->out_shape, (size_t)k->out_rank * sizeof(npy_intp));
 
+    PyObject *wanted = args[k->groups + 1];
+    const long threads = PyLong_CheckExact(wanted) ? PyLong_AsLong(wanted) : 0;
+    if (threads < 1) {
+        PyErr_Clear();
+        Py_RETURN_NONE;
+    }
     PyObject *out = args[k->groups];
     if (out == Py_None) {
         out = PyArray_SimpleNew(lead + k->out_rank, shape, NPY_DOUBLE);
@@ -102,11 +108,6 @@ static PyObject *kernel_call(PyObject *self, PyObject *const *args, size_t flags
         Py_INCREF(out);
     }
     double *result = PyArray_DATA((PyArrayObject *)out);
-    const long threads = args[k->groups + 1] == Py_None ? 1 : PyLong_AsLong(args[k->groups + 1]);
-    if (threads == -1 && PyErr_Occurred()) {
-        Py_DECREF(out);
-        return NULL;
-    }
     int verdict;
     if (n == 1) {
         verdict = kr16_run_one(k->kernel, k->parameters, inputs, result);
@@ -290,9 +291,27 @@ static struct PyModuleDef module = {
     NULL, NULL, NULL, NULL,
 };
 
+static int kernels_fit(void)
+{
+    for (const kr16_kernel *k = kr16_batch_kernels; k->name != NULL; k++) {
+        int rows = 0;
+        for (int g = 0; g < k->groups; g++)
+            rows += k->group[g].count * (k->group[g].kind == 't' ? 2 : 1);
+        if (rows > KR16_MAX_ROWS || k->width + k->guards > KR16_MAX_RESULTS) {
+            PyErr_Format(PyExc_ImportError, "kernel %s has %d input and %d result rows; room is "
+                         "for %d and %d", k->name, rows, k->width + k->guards, KR16_MAX_ROWS,
+                         KR16_MAX_RESULTS);
+            return 0;
+        }
+    }
+    return 1;
+}
+
 PyMODINIT_FUNC PyInit__native(void)
 {
     import_array();
+    if (!kernels_fit())
+        return NULL;
     if (PyType_Ready(&KernelType) < 0)
         return NULL;
     PyObject *m = PyModule_Create(&module);
