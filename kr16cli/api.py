@@ -7,7 +7,7 @@ a batch on the engine. A wrong shape or a non-finite input raises and names argu
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,12 +17,13 @@ import numpy.typing as npt
 from kr16cli import arrays
 from kr16cli.arrays import Array
 from kr16cli.kernels.columns import ARRAYS
-from kr16cli.kinematics import Kinematics, Like, flat_rows, pose_rows
-from kr16cli.model import chain, coriolis, dynamics, energy, inertia, orientation, task
+from kr16cli.kinematics import Kinematics, Like, pose_rows
+from kr16cli.model import dynamics, orientation, task
 from kr16cli.model.posture import status, turn
 from kr16cli.model.scalars import Scalar
 from kr16cli.robot import Inertia6, Payload, Vector3
 from kr16cli.robot_file import load_data, parse_data
+from kr16cli.robot_rules import checked_payload
 
 
 def load_robot(
@@ -69,8 +70,17 @@ class Robot(Kinematics):
         com: Vector3 = (0.0, 0.0, 0.0),
         inertia: Inertia6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     ) -> Robot:
-        """The same robot with this load (kg; m and kg m2 in flange axes) in place of any other."""
-        load = Payload(float(mass), tuple(map(float, com)), tuple(map(float, inertia)))  # type: ignore[arg-type]
+        """The same robot with this load in place of any other.
+
+        Args:
+            mass: kg, 0 or more.
+            com: mass centre in flange axes from the flange origin, m.
+            inertia: (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the mass centre, kg m2.
+
+        Raises:
+            InputError: numbers that no rigid load has.
+        """
+        load = checked_payload(mass, com, inertia)
         return Robot(self.data, payload=load, drives=self.drives, tool=self.tool)
 
     def with_tool(self, tool: Like | None) -> Robot:
@@ -79,7 +89,7 @@ class Robot(Kinematics):
 
     def with_gravity(self, gravity: Vector3) -> Robot:
         """The same robot under another gravity vector (m/s2, robroot axes)."""
-        x, y, z = map(float, gravity)
+        x, y, z = arrays.checked("gravity", np.reshape(gravity, -1), 3).tolist()
         data = self.data.with_gravity((x, y, z))
         return Robot(data, payload=self.payload, drives=self.drives, tool=self.tool)
 
@@ -89,115 +99,57 @@ class Robot(Kinematics):
 
     # Dynamics -------------------------------------------------------------------------------
 
-    @property
-    def _parts(self) -> tuple[tuple[inertia.Body, ...], Any, tuple[float, ...], tuple[float, ...]]:
-        """Base bodies, geometry, gravity, rotors."""
-        arm = self.arm
-        return arm.base_bodies, self.data.geometry, arm.gravity_vector, arm.rotors
+    def _dynamic(
+        self, name: str, inputs: tuple[Like, ...], out: Array | None, threads: int
+    ) -> Array:
+        """A quantity that needs inertial data."""
+        if not self.data.links:
+            self.arm.require_inertia()
+        return self._ask(name, inputs, out, threads)
 
     def mass_matrix(self, q: Like, *, out: Array | None = None, threads: int = 1) -> Array:
         """M(q) of (3.38), (..., 6, 6), kg m2."""
-        bodies, g, _, rotors = self._parts
-        return self._evaluate(
-            {"q": q},
-            (6, 6),
-            self.arm.mass_matrix,
-            lambda cs: flat_rows(dynamics.mass_matrix(cs, bodies, g, rotors)),
-            out,
-            threads,
-        )
+        return self._dynamic("mass_matrix", (q,), out, threads)
 
     def coriolis_matrix(
         self, q: Like, qd: Like, *, out: Array | None = None, threads: int = 1
     ) -> Array:
         """C(q, qd) of (3.40)-(3.41), (..., 6, 6), kg m2/s: M_dot - 2 C is skew."""
-        bodies, g, _, _ = self._parts
-        return self._evaluate(
-            {"q": q, "qd": qd},
-            (6, 6),
-            self.arm.coriolis_matrix,
-            lambda cs, rates: flat_rows(coriolis.coriolis_matrix(cs, rates, bodies, g)),
-            out,
-            threads,
-        )
+        return self._dynamic("coriolis_matrix", (q, qd), out, threads)
 
     def christoffel(self, q: Like, *, out: Array | None = None, threads: int = 1) -> Array:
         """The matrices C_k(i, j) of (3.41), (..., 6, 6, 6) with k first, kg m2."""
-        bodies, g, _, _ = self._parts
-        return self._evaluate(
-            {"q": q},
-            (6, 6, 6),
-            self.arm.christoffel,
-            lambda cs: (v for ck in coriolis.christoffel(cs, bodies, g) for v in flat_rows(ck)),
-            out,
-            threads,
-        )
+        return self._dynamic("christoffel", (q,), out, threads)
 
     def gravity(self, q: Like, *, out: Array | None = None, threads: int = 1) -> Array:
         """G(q) of (3.42), (..., 6), N m."""
-        bodies, g, gravity, _ = self._parts
-        return self._evaluate(
-            {"q": q},
-            (6,),
-            self.arm.gravity,
-            lambda cs: dynamics.gravity_torque(cs, bodies, g, gravity),
-            out,
-            threads,
-        )
+        return self._dynamic("gravity", (q,), out, threads)
 
     def friction(self, qd: Like) -> Array:
         """Friction torque against qd, (..., 6), N m: 0 without drives, else regularised."""
         rates = arrays.checked("qd", qd, 6)
-        return np.stack(self._friction([rates[..., i] for i in range(6)]), axis=-1)
-
-    def _friction(self, rates: list[Scalar]) -> list[Scalar]:
-        if not self.drives:
-            return [rate * 0.0 for rate in rates]
-        coulomb = [j.coulomb or 0.0 for j in self.data.joints]
-        viscous = [j.viscous or 0.0 for j in self.data.joints]
-        return dynamics.friction(rates, coulomb, viscous, ARRAYS)
+        k = self._numbers
+        if not k.coulomb:
+            return np.zeros_like(rates)
+        columns = [rates[..., i] for i in range(6)]
+        return np.stack(dynamics.friction(columns, k.coulomb, k.viscous, ARRAYS), axis=-1)
 
     def inverse_dynamics(
         self, q: Like, qd: Like, qdd: Like, *, out: Array | None = None, threads: int = 1
     ) -> Array:
         """Torques M qdd + C qd + G (+ friction with drives), (..., 6), N m."""
-        bodies, g, gravity, rotors = self._parts
-
-        def kernel(cs: Any, rates: Any, accelerations: Any) -> Iterable[Scalar]:
-            tau = dynamics.inverse_dynamics(cs, rates, accelerations, bodies, g, gravity, rotors)
-            if not self.drives:
-                return tau
-            return [t + f for t, f in zip(tau, self._friction(rates), strict=True)]
-
-        named = {"q": q, "qd": qd, "qdd": qdd}
-        return self._evaluate(named, (6,), self.arm.inverse_dynamics, kernel, out, threads)
+        return self._dynamic("inverse_dynamics", (q, qd, qdd), out, threads)
 
     def forward_dynamics(
         self, q: Like, qd: Like, tau: Like, *, out: Array | None = None, threads: int = 1
     ) -> Array:
         """Accelerations qdd for torques tau, (..., 6), rad/s2."""
-        bodies, g, gravity, rotors = self._parts
-
-        def kernel(cs: Any, rates: Any, torque: Any) -> Iterable[Scalar]:
-            net = torque
-            if self.drives:
-                net = [t - f for t, f in zip(torque, self._friction(rates), strict=True)]
-            return dynamics.forward_dynamics(cs, rates, net, bodies, g, gravity, rotors)
-
-        named = {"q": q, "qd": qd, "tau": tau}
-        return self._evaluate(named, (6,), self.arm.forward_dynamics, kernel, out, threads)
+        return self._dynamic("forward_dynamics", (q, qd, tau), out, threads)
 
     def energy(self, q: Like, qd: Like, *, threads: int = 1) -> tuple[Array, Array]:
         """(kinetic, potential) energy, J, each (...); potential zero at robroot's origin."""
-        bodies, g, gravity, rotors = self._parts
-        full = self.arm.bodies
-
-        def kernel(cs: Any, rates: Any) -> Iterable[Scalar]:
-            yield energy.kinetic(dynamics.mass_matrix(cs, bodies, g, rotors), rates)
-            yield energy.potential(chain.frames(cs, g), full, g, gravity)
-
-        both = self._evaluate({"q": q, "qd": qd}, (2,), self.arm.energy, kernel, None, threads)
-        return both[..., 0], both[..., 1]
+        both = self._dynamic("energy", (q, qd), None, threads)
+        return both[..., 0].copy(), both[..., 1].copy()
 
     def base_wrench(
         self, q: Like, qd: Like, qdd: Like, *, out: Array | None = None, threads: int = 1
@@ -207,15 +159,7 @@ class Robot(Kinematics):
         Robroot axes, moment about robroot's origin. Without the fixed base's own weight; the
         load on the foundation is its negative. At rest the force is the weight, upward.
         """
-        full, g = inertia.sparse(self.arm.bodies), self.data.geometry
-        gravity = self.arm.gravity_vector
-
-        def kernel(cs: Any, rates: Any, accelerations: Any) -> Iterable[Scalar]:
-            force, moment = energy.base_wrench(cs, rates, accelerations, full, g, gravity)
-            return (*force, *moment)
-
-        named = {"q": q, "qd": qd, "qdd": qdd}
-        return self._evaluate(named, (6,), self.arm.base_wrench, kernel, out, threads)
+        return self._dynamic("base_wrench", (q, qd, qdd), out, threads)
 
     def task_space(self, q: Like, qd: Like) -> TaskSpaceArrays:
         """Mx, Cx (..., 6, 6), Gx (..., 6), Ja, Ja' for x = (p, phi, theta, psi) of the flange.

@@ -98,3 +98,10 @@ def result(out: Array | None, shape: tuple[int, ...]) -> Array:
     if not out.flags.writeable:
         raise InputError("out is read-only; pass a writable array")
     return out
+
+
+def checked_threads(threads: object) -> int:
+    """A whole number of threads, 1 or more."""
+    if not isinstance(threads, (int, np.integer)) or isinstance(threads, bool) or threads < 1:
+        raise InputError(f"threads is {threads!r}; expected a whole number of 1 or more")
+    return int(threads)

@@ -85,11 +85,12 @@ class CheckFailedError(Kr16Error):
 class MissingPartError(Kr16Error):
     """An optional part is not installed.
 
-    Attributes: `part`, `extra` (the pip extra that brings it).
+    Attributes: `part`, `extra` (the pip extra that brings it, or None), `remedy`.
     """
 
     exit_code = 4
 
-    def __init__(self, part: str, extra: str) -> None:
+    def __init__(self, part: str, extra: str | None, remedy: str | None = None) -> None:
         self.part, self.extra = part, extra
-        super().__init__(f"{part} is not installed; run: pip install 'kr16cli[{extra}]'")
+        self.remedy = remedy or f"run: pip install 'kr16cli[{extra}]'"
+        super().__init__(f"{part} is not installed; {self.remedy}")

@@ -7,7 +7,8 @@ a batch on the engine. A wrong shape or a non-finite input raises and names argu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,15 +17,25 @@ import numpy.typing as npt
 from kr16cli import arrays
 from kr16cli.arrays import Array
 from kr16cli.errors import InputError, NoAnswerError
-from kr16cli.kernels import engine
-from kr16cli.kernels.columns import ARRAYS, Trig
-from kr16cli.model import chain, energy, forward, inverse, jacobian, orientation
-from kr16cli.model.scalars import FLOATS, Scalar
+from kr16cli.kernels import engine_name
+from kr16cli.kernels.columns import ARRAYS, ColumnEngine
+from kr16cli.kernels.parameters import Parameters, parameters
+from kr16cli.kernels.quantities import ANGLES, QUANTITIES, Quantity
+from kr16cli.kernels.quantities import flat as flatten
+from kr16cli.model import orientation
+from kr16cli.model.scalars import FLOATS, Functions, Scalar
 from kr16cli.model.view import Axes, View
 from kr16cli.robot import Payload, RobotData
 from kr16cli.single import Arm
 
 Like = npt.ArrayLike
+
+
+def _defect(_: Parameters, t: Any, __: Functions) -> Iterable[Scalar]:
+    return orientation.rotation_defect([t[0:3], t[4:7], t[8:11]])
+
+
+_DEFECT = Quantity(("T",), (2,), _defect)
 
 
 class Frames(NamedTuple):
@@ -72,103 +83,112 @@ class Kinematics:
     ) -> None:
         self.data, self.payload, self.drives = data, payload, drives
         self.arm = Arm(data, payload=payload, drives=drives)
-        self._engine = engine()
+        self._columns = ColumnEngine()
+        self._native: Mapping[str, Any] | None = None
+        if engine_name() == "native":
+            from kr16cli.kernels.native_engine import NativeKernels
+
+            self._native = NativeKernels(self._numbers)
         self.tool = None if tool is None else self._poses("tool", tool)
 
     # Plumbing -------------------------------------------------------------------------------
 
-    def _evaluate(
-        self,
-        named: Mapping[str, Like],
-        shape: tuple[int, ...],
-        one: Callable[..., npt.ArrayLike],
-        kernel: Callable[..., Iterable[Scalar]],
-        out: Array | None = None,
-        threads: int = 1,
-    ) -> Array:
-        """Run on floats for one configuration, on the engine for a batch.
+    @cached_property
+    def _numbers(self) -> Parameters:
+        """What the kernels are told about the robot."""
+        return parameters(self.arm)
 
-        The first argument enters the kernel as (cos, sin) pairs, the others as columns.
-        """
-        values = [arrays.checked(name, value, 6) for name, value in named.items()]
-        lead = arrays.batch(list(named), values, [1] * len(values))
-        target = arrays.result(out, lead + shape)
-        if not lead:
-            target[...] = one(*(v.tolist() for v in values))
+    def _ask(
+        self, name: str, inputs: tuple[Like | None, ...], out: Array | None, threads: int
+    ) -> Array:
+        """A quantity of `kernels.quantities`: compiled where nothing needs care."""
+        if self._native is not None:
+            result = self._native[name](*inputs, out, threads)
+            if result is not None:
+                return result  # type: ignore[no-any-return]  # the kernel's array
+        return self._ask_with_care(name, inputs, out, threads)
+
+    def _ask_with_care(
+        self, name: str, inputs: tuple[Like | None, ...], out: Array | None, threads: int
+    ) -> Array:
+        """The same after checks and conversions, on floats for one configuration."""
+        quantity = QUANTITIES[name]
+        known = {n: v for n, v in zip(quantity.inputs, inputs, strict=True) if v is not None}
+        values = {n: self._checked(n, v) for n, v in known.items()}
+        ranks = [2 if n == "T" else 1 for n in values]
+        lead = arrays.batch(list(values), list(values.values()), ranks)
+        target = arrays.result(out, lead + quantity.shape)
+        threads = arrays.checked_threads(threads)
+        if not lead and self._native is None:
+            target[...] = self._one(name, *(v.tolist() for v in values.values()))
             return target
-        flat = [arrays.flat(v, lead, 1) for v in values]
-        self._run(kernel, [Trig(flat[0]), *flat[1:]], target, len(lead), threads)
+        flat = {n: arrays.flat(v, lead, k) for (n, v), k in zip(values.items(), ranks, strict=True)}
+        self._fill(name, flat, target, len(lead), threads)
         return target
 
-    def _run(
-        self,
-        kernel: Callable[..., Iterable[Scalar]],
-        inputs: Sequence[Array | Trig],
-        target: Array,
-        lead: int,
-        threads: int,
+    def _checked(self, name: str, value: Like) -> Array:
+        if name == "T":
+            return self._poses(name, value)
+        return arrays.checked(name, value, 6)
+
+    def _one(self, name: str, *inputs: Any) -> npt.ArrayLike:
+        """A quantity for one configuration of lists of floats; `single.Arm` by name."""
+        if name == "ik":
+            return self.arm.ik(*inputs).angles
+        if hasattr(self.arm, name) and name not in ("frames", "singularity"):
+            return getattr(self.arm, name)(*inputs)  # type: ignore[no-any-return]
+        quantity = QUANTITIES[name]
+        arguments = [
+            FLOATS.trig(v) if n in ANGLES else v
+            for n, v in zip(quantity.inputs, inputs, strict=True)
+        ]
+        values = [float(v) for v in quantity.results(self._numbers, *arguments, FLOATS)]
+        return np.array(values).reshape(quantity.shape)
+
+    def _fill(
+        self, name: str, flat: Mapping[str, Array], target: Array, lead: int, threads: int
     ) -> None:
-        """Fill `target`, whose first `lead` axes are the batch, through a flat table."""
+        """Fill `target`, whose first `lead` axes are the batch, from flat inputs (n, k)."""
+        quantity = QUANTITIES[name]
         n = int(np.prod(target.shape[:lead], dtype=int))
-        width = int(np.prod(target.shape[lead:], dtype=int))
-        if target.flags.c_contiguous:
-            self._engine.run(kernel, inputs, target.reshape(n, width), threads)
-            return
-        table = np.empty((n, width))
-        self._engine.run(kernel, inputs, table, threads)
-        target[...] = table.reshape(target.shape)
+        table = target if target.flags.c_contiguous else np.empty(target.shape)
+        table = table.reshape(n, -1 if n else int(np.prod(quantity.shape)))
+        inputs = [flat.get(i) for i in quantity.inputs]
+        if self._native is not None and n:
+            clean = [None if v is None else np.ascontiguousarray(v) for v in inputs]
+            if quantity.inputs[0] == "T" and clean[0] is not None:
+                clean[0] = clean[0].reshape(n, 4, 4)
+            if self._native[name](*clean, table.reshape(n, *quantity.shape), threads) is None:
+                raise RuntimeError(f"the kernel {name} refused checked input")
+        else:
+            self._columns.run(quantity, self._numbers, inputs, table, threads)
+        if not np.shares_memory(table, target):
+            target[...] = table.reshape(target.shape)
 
     # Kinematics -----------------------------------------------------------------------------
 
     def fk(self, q: Like, *, out: Array | None = None, threads: int = 1) -> Array:
         """T_robroot_flange (or T_robroot_tool), (..., 4, 4): the closed form (3.3)-(3.6)."""
-        g = self.data.geometry
-        pose = self._evaluate(
-            {"q": q},
-            (4, 4),
-            self.arm.fk,
-            lambda cs: flat_rows(forward.flange(cs, g).rows()),
-            out,
-            threads,
-        )
+        pose = self._ask("fk", (q,), out, threads)
         if self.tool is not None:
             pose[...] = pose @ self.tool
         return pose
 
     def frames(self, q: Like, *, threads: int = 1) -> Frames:
         """All frames of Table 3.1 as products of DH transforms, and what derives from them."""
-        g = self.data.geometry
-
-        def kernel(cs: Any) -> Iterable[Scalar]:
-            links = chain.frames(cs, g)
-            yield from (v for frame in links for v in flat_rows(frame.rows()))
-            yield from flat_rows(chain.flange_of_frame6(links[6]).rows())
-            yield from links[4].p
-            yield from flat_rows(forward.r36(cs))
-
-        def one(angles: Sequence[float]) -> list[float]:
-            return [float(v) for v in kernel(FLOATS.trig(angles))]
-
-        table = self._evaluate({"q": q}, (140,), one, kernel, None, threads)
+        table = self._ask("frames", (q,), None, threads)
         lead = table.shape[:-1]
         return Frames(
             table[..., :112].reshape(*lead, 7, 4, 4),
             table[..., 112:128].reshape(*lead, 4, 4),
-            table[..., 128:131],
+            table[..., 128:131].copy(),
             table[..., 131:].reshape(*lead, 3, 3),
         )
 
     def mass_centres(self, q: Like, *, out: Array | None = None, threads: int = 1) -> Array:
         """The six mass centres (3.29) in robroot, (..., 6, 3); the payload counts to link 6."""
-        g, bodies = self.data.geometry, self.arm.bodies
-        return self._evaluate(
-            {"q": q},
-            (6, 3),
-            self.arm.mass_centres,
-            lambda cs: flat_rows(energy.mass_centres(chain.frames(cs, g), bodies, g)),
-            out,
-            threads,
-        )
+        self.arm.require_inertia()
+        return self._ask("mass_centres", (q,), out, threads)
 
     def ik(
         self,
@@ -188,26 +208,9 @@ class Kinematics:
         Raises:
             InputError: a matrix that is no rigid pose. Never for an unreachable one.
         """
-        poses = self._flange_poses(T)
-        start = arrays.checked("near", np.zeros(6) if near is None else near, 6)
-        lead = arrays.batch(["T", "near"], [poses, start], [2, 1])
-        target = arrays.result(out, (*lead, 8, 6))
-        if not lead:
-            target[...] = self.arm.ik(poses.tolist(), start.tolist()).angles
-            return target
-        g = self.data.geometry
-
-        zero = (0.0,) * 6
-
-        def kernel(t: Sequence[Scalar], last: Sequence[Scalar] = zero) -> Iterable[Scalar]:
-            rotation = [t[0:3], t[4:7], t[8:11]]
-            return flat_rows(inverse.solve(rotation, (t[3], t[7], t[11]), g, last, ARRAYS).angles)
-
-        inputs = [arrays.flat(poses, lead, 2)]
-        if near is not None:
-            inputs.append(arrays.flat(start, lead, 1))
-        self._run(kernel, inputs, target, len(lead), threads)
-        return target
+        if self.tool is not None:
+            T = self._flange_poses(T)
+        return self._ask("ik", (T, near), out, threads)
 
     def ik_path(self, T: Like, near: Like | None = None) -> Array:
         """One configuration per pose of a path (n, 4, 4): (n, 6), each nearest to the one before.
@@ -248,10 +251,7 @@ class Kinematics:
         flat = poses.reshape(-1, 16)
         defects = np.empty((len(flat), 2))
 
-        def kernel(t: Sequence[Scalar]) -> Iterable[Scalar]:
-            return orientation.rotation_defect([t[0:3], t[4:7], t[8:11]])
-
-        self._engine.run(kernel, [flat], defects)
+        self._columns.run(_DEFECT, self._numbers, [flat], defects)
         arrays.reject_bad_poses(name, poses, defects)
         return poses
 
@@ -259,13 +259,17 @@ class Kinematics:
         poses = self._poses("T", T)
         return poses if self.tool is None else poses @ np.linalg.inv(self.tool)
 
-    def _jacobian_options(self, link: int, point: Like | None) -> tuple[int, list[float] | None]:
+    def _view(self, link: int, point: Like | None, axes: str) -> View:
+        """The checked choice of a Jacobian."""
+        p: list[float] | None = None
         if point is not None:
             values = arrays.checked("point", point, 3)
             if values.ndim != 1:
                 raise InputError(f"point has shape {values.shape}; expected (3,)")
-            return link, values.tolist()
-        return link, self.tool[:3, 3].tolist() if self.tool is not None and link == 6 else None
+            p = values.tolist()
+        elif self.tool is not None and link == 6:
+            p = self.tool[:3, 3].tolist()
+        return View.of(self.data.geometry, link, p, axes)
 
     def jacobian(
         self,
@@ -283,16 +287,10 @@ class Kinematics:
         the flange for link 6). None is the flange or tool, else that frame's origin. `axes` of
         the rows: robroot, flange or chapter (the chapter's base b).
         """
-        link, p = self._jacobian_options(link, point)
-        view = View.of(self.data.geometry, link, p, axes)
-        return self._evaluate(
-            {"q": q},
-            (6, 6),
-            lambda angles: self.arm.jacobian(angles, link=link, point=p, axes=axes),
-            lambda cs: flat_rows(view.jacobian(cs)),
-            out,
-            threads,
-        )
+        view = self._view(link, point, axes)
+        if view == View(self.data.geometry):
+            return self._ask("jacobian", (q,), out, threads)
+        return self._seen("jacobian", view, {"q": q}, out, threads)
 
     def jacobian_dot(
         self,
@@ -306,47 +304,40 @@ class Kinematics:
         threads: int = 1,
     ) -> Array:
         """Rate of `jacobian` along qd, (3.47)-(3.51), (..., 6, 6); `axes` stand still."""
-        link, p = self._jacobian_options(link, point)
-        view = View.of(self.data.geometry, link, p, axes)
-        return self._evaluate(
-            {"q": q, "qd": qd},
-            (6, 6),
-            lambda a, r: self.arm.jacobian_dot(a, r, link=link, point=p, axes=axes),
-            lambda cs, rates: flat_rows(view.jacobian_dot(cs, rates)),
-            out,
-            threads,
-        )
+        view = self._view(link, point, axes)
+        if view == View(self.data.geometry):
+            return self._ask("jacobian_dot", (q, qd), out, threads)
+        return self._seen("jacobian_dot", view, {"q": q, "qd": qd}, out, threads)
+
+    def _seen(
+        self, name: str, view: View, named: Mapping[str, Like], out: Array | None, threads: int
+    ) -> Array:
+        """A Jacobian or its rate of any point in any axes, on columns."""
+        values = [arrays.checked(n, v, 6) for n, v in named.items()]
+        lead = arrays.batch(list(named), values, [1] * len(values))
+        target = arrays.result(out, (*lead, 6, 6))
+        flat = [arrays.flat(v, lead, 1) for v in values]
+        table = np.empty((len(flat[0]), 36))
+
+        def rows(_: Parameters, *arguments: Any) -> Iterable[Scalar]:
+            return flatten(getattr(view, name)(*arguments[:-1]))
+
+        quantity = Quantity(tuple(named), (6, 6), rows)
+        self._columns.run(quantity, self._numbers, flat, table, threads)
+        target[...] = table.reshape(target.shape)
+        return target
 
     def mass_centre_jacobians(
         self, q: Like, *, out: Array | None = None, threads: int = 1
     ) -> Array:
         """J of each link's mass centre (3.31)-(3.36), (..., 6, 6, 6): link first, robroot axes."""
-        g, bodies = self.data.geometry, self.arm.bodies
-
-        def kernel(cs: Any) -> Iterable[Scalar]:
-            a = forward.arm(cs, g)
-            centres = energy.mass_centres(chain.frames(cs, g), bodies, g)
-            for link, centre in enumerate(centres, 1):
-                yield from flat_rows(jacobian.jacobian(a, centre, link))
-
-        def one(angles: Sequence[float]) -> Array:
-            values = [float(v) for v in kernel(FLOATS.trig(angles))]
-            return np.array(values).reshape(6, 6, 6)
-
-        return self._evaluate({"q": q}, (6, 6, 6), one, kernel, out, threads)
+        self.arm.require_inertia()
+        return self._ask("mass_centre_jacobians", (q,), out, threads)
 
     def singularity(self, q: Like) -> SingularityFactors:
         """The factors of det J at q, each of the leading shape."""
-        g = self.data.geometry
-
-        def kernel(cs: Any) -> Iterable[Scalar]:
-            yield jacobian.shoulder_factor(cs, g)
-            yield jacobian.elbow_factor(cs, g)
-            yield jacobian.wrist_factor(cs)
-            yield jacobian.determinant(cs, g)
-
-        table = self._evaluate({"q": q}, (4,), lambda a: list(kernel(FLOATS.trig(a))), kernel)
-        return SingularityFactors(*(table[..., i] for i in range(4)))
+        table = self._ask("singularity", (q,), None, 1)
+        return SingularityFactors(*(table[..., i].copy() for i in range(4)))
 
     def rpy(self, T: Like) -> Array:
         """(phi, theta, psi) of (3.45), KUKA's A, B, C in rad, (..., 3) of poses (..., 4, 4).
@@ -374,11 +365,6 @@ class Kinematics:
             for j, value in enumerate(row):
                 out[..., i, j] = value
         return out
-
-
-def flat_rows(rows: Iterable[Iterable[Scalar]]) -> Iterable[Scalar]:
-    """The elements of row lists, row by row."""
-    return (value for row in rows for value in row)
 
 
 def pose_rows(poses: Array) -> list[list[Array]]:

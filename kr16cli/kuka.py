@@ -25,6 +25,7 @@ from kr16cli.model.orientation import rotation_from_rpy, rpy_from_rotation
 from kr16cli.model.posture import status, turn
 from kr16cli.model.scalars import FLOATS
 from kr16cli.robot import Payload
+from kr16cli.robot_rules import checked_payload
 from kr16cli.tolerances import TOLERANCES
 
 __all__ = [
@@ -166,20 +167,9 @@ def _checked_payload(
     mass: float, com: Sequence[float], moments: Sequence[float], R: Sequence[Sequence[float]]
 ) -> Payload:
     """A payload with principal `moments` (kg m2) along the columns of R."""
-    if not mass >= 0.0:
-        raise InputError(f"payload mass is {mass:g} kg; it must be 0 or more")
-    if min(moments) < 0.0:
-        raise InputError(
-            f"payload inertia {min(moments):g} kg m2 is negative; it must be 0 or more"
-        )
-    if max(moments) > (sum(moments) - max(moments)) * (1.0 + TOLERANCES.limit):
-        raise InputError(
-            f"payload inertia {', '.join(f'{m:g}' for m in moments)} kg m2: one moment exceeds "
-            "the sum of the other two; no rigid body has that"
-        )
 
     def entry(i: int, j: int) -> float:
         return math.fsum(R[i][k] * moments[k] * R[j][k] for k in range(3))
 
     inertia = (entry(0, 0), entry(1, 1), entry(2, 2), entry(0, 1), entry(0, 2), entry(1, 2))
-    return Payload(mass, (com[0], com[1], com[2]), inertia)
+    return checked_payload(mass, com, inertia)

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from kr16cli.robot import Inertia6
+from kr16cli.errors import InputError
+from kr16cli.robot import Inertia6, Payload
 
 # Rounding of a tensor typed with 16 digits; a body needs no finer test.
 _RELATIVE = 1e-12
@@ -152,3 +153,35 @@ def inertia_problem(inertia: Inertia6) -> str | None:
     if low + middle < high * (1.0 - _RELATIVE):
         return f"two principal moments must add up to the third (triangle inequality); {moments}"
     return None
+
+
+def checked_payload(mass: float, com: Sequence[float], inertia: Sequence[float]) -> Payload:
+    """A payload whose numbers a rigid load can have; a point mass and a rod are allowed.
+
+    Args:
+        mass: kg, 0 or more.
+        com: mass centre in flange axes, m, 3 numbers.
+        inertia: (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the mass centre, kg m2, 6 numbers.
+
+    Raises:
+        InputError: naming what is wrong, its value and the rule.
+    """
+    for name, values, count in (("com", com, 3), ("inertia", inertia, 6)):
+        if len(values) != count:
+            raise InputError(f"payload {name} has {len(values)} numbers; expected {count}")
+    for name, numbers in (("mass", (mass,)), ("com", com), ("inertia", inertia)):
+        for value in numbers:
+            if not math.isfinite(value):
+                raise InputError(f"payload {name} has {value}; every number must be finite")
+    if mass < 0.0:
+        raise InputError(f"payload mass is {mass:g} kg; it must be 0 or more")
+    xx, yy, zz, xy, xz, yz = map(float, inertia)
+    tensor = (xx, yy, zz, xy, xz, yz)
+    low, middle, high = principal_moments(tensor)
+    if low < -_RELATIVE * high or low + middle < high * (1.0 - _RELATIVE):
+        raise InputError(
+            f"payload inertia has principal moments {low:.6g}, {middle:.6g}, {high:.6g} kg m2; "
+            "no rigid body has that (none negative, any two at least the third)"
+        )
+    x, y, z = map(float, com)
+    return Payload(float(mass), (x, y, z), tensor)

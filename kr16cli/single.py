@@ -67,14 +67,18 @@ class Arm:
         self.data, self.payload, self.drives = data, payload, drives
         self.geometry = data.geometry
 
-    @cached_property
-    def bodies(self) -> tuple[inertia.Body, ...]:
-        """The six links with the payload, full parameters, in joint frames."""
+    def require_inertia(self) -> None:
+        """InputError where the file has no inertial data."""
         if not self.data.links:
             raise InputError(
                 f"{self.data.name} ({self.data.path}) has no inertial data: 0 of 6 links; "
                 "dynamics needs a file with six [[link]] groups"
             )
+
+    @cached_property
+    def bodies(self) -> tuple[inertia.Body, ...]:
+        """The six links with the payload, full parameters, in joint frames."""
+        self.require_inertia()
         return inertia.robot_bodies(self.data.links, self.payload, self.geometry)
 
     @cached_property

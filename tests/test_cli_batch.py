@@ -210,7 +210,8 @@ def test_npz_rows_that_are_not_finite_are_bad(tmp_path: Path) -> None:
     [
         ({"x": np.zeros((2, 6))}, ("lacks the array q", "found: x")),
         ({"q": np.zeros((2, 5))}, ("q has shape (2, 5)", "(n, 6)")),
-        ({"q": np.array(["a"] * 6)}, ("no readable npz",)),
+        ({"q": np.array(["a"] * 6)}, ("q has dtype", "real numbers")),
+        ({"q": np.zeros((2, 6), dtype=complex)}, ("q has dtype complex128", "real numbers")),
         ({"q": np.array([None] * 6, dtype=object)}, ("no readable npz",)),
         ({"q": np.zeros((2, 6)), "qd": np.zeros((3, 6))}, ("qd has 3 rows, q has 2",)),
     ],

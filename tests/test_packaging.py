@@ -27,6 +27,8 @@ _HOME = ("fk", "0", "-90", "90", "0", "0", "0", "--json")
 
 _Install = Callable[..., Path]
 
+_HAS_COMPILER = any(shutil.which(name) for name in ("cc", "gcc", "clang"))
+
 
 def _run(*command: str | Path, cwd: Path, env: dict[str, str] | None = None) -> str:
     """Stdout of a command; AssertionError with all it said if it fails."""
@@ -67,8 +69,10 @@ def install(tmp_path: Path) -> _Install:
     return into_fresh_environment
 
 
-def _check_commands(bin_folder: Path, cwd: Path) -> None:
+def _check_commands(bin_folder: Path, cwd: Path, *, native: bool = _HAS_COMPILER) -> None:
     """The installed command answers, from a folder that is not the checkout."""
+    engine = json.loads(_run(bin_folder / "kr16", "info", "--json", cwd=cwd))["result"]["engine"]
+    assert engine["arrays"] == ("native" if native else "numpy")
     home = json.loads(_run(bin_folder / "kr16", *_HOME, cwd=cwd))
     pose = home["result"]["pose"]
     expected = {"x": 1088, "y": 0, "z": 1320, "b": 90}
@@ -110,7 +114,7 @@ def test_extras_are_as_promised() -> None:
 
 @pytest.mark.packaging
 def test_wheel_holds_the_package_and_the_assets(wheel: Path, source: Path) -> None:
-    assert wheel.name == f"kr16cli-{kr16cli.__version__}-py3-none-any.whl"
+    assert wheel.name.startswith(f"kr16cli-{kr16cli.__version__}-cp3")
     shipped = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
     places = {
         "kr16cli": "kr16cli",
@@ -122,9 +126,11 @@ def test_wheel_holds_the_package_and_the_assets(wheel: Path, source: Path) -> No
         f"{place}/{path.relative_to(source / folder).as_posix()}"
         for folder, place in places.items()
         for path in (source / folder).rglob("*")
-        if path.is_file() and "__pycache__" not in path.parts
+        if path.is_file() and not {"__pycache__", "native"} & set(path.parts)
     }
-    assert shipped == expected
+    compiled = {name for name in shipped if name.startswith("kr16cli/kernels/_native.c")}
+    assert len(compiled) == _HAS_COMPILER
+    assert shipped - compiled == {n for n in expected if not n.endswith((".so", ".pyd"))}
     assert {"kr16cli/py.typed", "kr16cli/assets/data/kr16_2.toml"} <= shipped
 
 
@@ -153,4 +159,4 @@ def test_source_install_needs_no_compiler_and_no_build_tool(
     env = _without(*tools)
     assert not any(shutil.which(name, path=env["PATH"]) for name in tools)
     env = {key: value for key, value in env.items() if key not in {"CC", "CXX"}}
-    _check_commands(install(source, env=env), tmp_path)
+    _check_commands(install(source, env=env), tmp_path, native=False)

@@ -94,7 +94,7 @@ def _answer(question: Question, row: rows.Row, *, track: bool) -> tuple[Answer |
     if row.problem is not None:
         return None, row.problem
     try:
-        answer = question.answer(row.values)
+        answer = question.finite_answer(row.values)
     except Kr16Error as error:
         return None, str(error)
     if track:

@@ -153,7 +153,7 @@ def _npz_batch(content: bytes, name: str, needed: str, optional: Sequence[str]) 
     try:
         with np.load(BytesIO(content), allow_pickle=False) as archive:
             arrays = {
-                group: np.asarray(archive[keys.get(group, group)], dtype=float)
+                group: np.asarray(archive[keys.get(group, group)])
                 for group in (needed, *optional)
                 if keys.get(group, group) in archive
             }
@@ -163,13 +163,16 @@ def _npz_batch(content: bytes, name: str, needed: str, optional: Sequence[str]) 
     if needed not in arrays:
         raise FileError(name, f"lacks the array {keys[needed]}; found: {found}")
     for group, array in arrays.items():
+        if array.dtype.kind not in "fiu":
+            key = keys.get(group, group)
+            raise FileError(name, f"{key} has dtype {array.dtype}; expected real numbers")
         shape = shapes.get(group, (6,))
         if array.shape[-len(shape) :] != shape:
             wanted = ", ".join(map(str, shape))
             raise FileError(
                 name, f"{keys.get(group, group)} has shape {array.shape}; expected (n, {wanted})"
             )
-        arrays[group] = array.reshape(-1, *shape)
+        arrays[group] = array.astype(float).reshape(-1, *shape)
     count = len(arrays[needed])
     for group, array in arrays.items():
         if len(array) != count:

@@ -87,7 +87,7 @@ def _single(
     target: output.Target,
     tabulate: Callable[[Mapping[str, Any], Mapping[str, str]], str],
 ) -> int:
-    answer = question.answer({question.reads: value})
+    answer = question.finite_answer({question.reads: value})
     if common.kind == "json":
         inputs = {question.reads: value, **question.options}
         target.write(render.json_text(question.envelope(inputs, answer.result, answer.warnings)))

@@ -24,7 +24,7 @@ def number(text: str, name: str) -> float:
         raise InputError(f"{name} is {shown}; it must be a number") from None
     if not math.isfinite(value):
         raise InputError(f"{name} is {text.strip()}; every number must be finite")
-    return value
+    return value + 0.0  # a typed -0 is 0
 
 
 def numbers(words: Sequence[str], names: Sequence[str], what: str) -> list[float]:

@@ -1,7 +1,7 @@
-"""Batch kernels: the model over many configurations, and the choice of the engine that runs it."""
+"""Batch kernels: the model over many configurations, on NumPy or compiled to C."""
 
 from __future__ import annotations
 
-from kr16cli.kernels.engine import engine, engine_name
+from kr16cli.kernels.engine import engine_name, has_native
 
-__all__ = ["engine", "engine_name"]
+__all__ = ["engine_name", "has_native"]

@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from importlib.util import find_spec
 
-from kr16cli.errors import InputError
+from kr16cli.errors import InputError, MissingPartError
 
-if TYPE_CHECKING:
-    from kr16cli.kernels.columns import Engine
+ENGINES = ("native", "numpy")
 
-_KNOWN = ("numpy",)
+
+def has_native() -> bool:
+    """Whether this installation has the compiled kernels."""
+    return find_spec("kr16cli.kernels._native") is not None
 
 
 def engine_name() -> str:
-    """Name of the engine that serves: the environment's KR16_ENGINE, else the fastest here."""
-    name = os.environ.get("KR16_ENGINE") or _KNOWN[0]
-    if name not in _KNOWN:
-        raise InputError(f"KR16_ENGINE is {name!r}; this build has {', '.join(_KNOWN)}")
+    """Name of the engine that serves: the environment's KR16_ENGINE, else the fastest here.
+
+    Raises:
+        InputError: KR16_ENGINE names no engine. MissingPartError: one that is not built.
+    """
+    name = os.environ.get("KR16_ENGINE", "").strip().lower()
+    if not name:
+        return "native" if has_native() else "numpy"
+    if name not in ENGINES:
+        raise InputError(f"KR16_ENGINE is {name!r}; choose {' or '.join(ENGINES)}")
+    if name == "native" and not has_native():
+        raise MissingPartError(
+            "the native engine that KR16_ENGINE asks for",
+            None,
+            "install kr16cli again where there is a C compiler, or unset KR16_ENGINE",
+        )
     return name
-
-
-def engine() -> Engine:
-    """The engine in force."""
-    engine_name()
-    from kr16cli.kernels.columns import Engine as NumpyEngine  # NumPy is heavy
-
-    return NumpyEngine()

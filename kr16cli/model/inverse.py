@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from kr16cli.model.orientation import Rows
-from kr16cli.model.scalars import Functions, Scalar, Vector, angle_sum
+from kr16cli.model.scalars import Functions, Scalar, Trig, Vector, angle_sum
 from kr16cli.robot import Geometry
 from kr16cli.tolerances import TOLERANCES
 
@@ -129,7 +129,14 @@ def solve(
 
     `near` is the configuration (rad) that supplies free angles. Joint limits are ignored.
     """
-    free = _Near(*((ns.cos(near[i]), ns.sin(near[i])) for i in (0, 1, 3)))
+    return solve_near(rotation, p, g, ns.trig(near), ns)
+
+
+def solve_near(
+    rotation: Rows, p: Sequence[Scalar], g: Geometry, near: Trig, ns: Functions
+) -> Solutions:
+    """`solve` for `near` given as (cos, sin) pairs."""
+    free = _Near(near[0], near[1], near[3])
     x, y, z = wrist_centre(rotation, p, g)
     radius = ns.sqrt(x * x + y * y)
     on_axis = radius < TOLERANCES.shoulder

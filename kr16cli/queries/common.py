@@ -31,6 +31,17 @@ class Answer(NamedTuple):
     q: list[float] | None = None
 
 
+def _all_finite(value: Any) -> bool:
+    """Whether every number in a result is finite."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    if isinstance(value, Mapping):
+        return all(map(_all_finite, value.values()))
+    if isinstance(value, (list, tuple)):
+        return all(map(_all_finite, value))
+    return True
+
+
 class Question(ABC):
     """A question asked once or for each row of a batch.
 
@@ -53,6 +64,19 @@ class Question(ABC):
     @abstractmethod
     def answer(self, values: Mapping[str, Any]) -> Answer:
         """Answer for one set of input numbers, as typed, by group."""
+
+    def finite_answer(self, values: Mapping[str, Any]) -> Answer:
+        """The answer; InputError where its numbers exceed what a double can hold."""
+        try:
+            answer = self.answer(values)
+        except OverflowError:
+            answer = None
+        if answer is None or not _all_finite(answer.result):
+            raise InputError(
+                f"{self.name}: the numbers typed are so large that the result overflows "
+                "(1.8e308); give smaller ones"
+            )
+        return answer
 
     @abstractmethod
     def columns(self, result: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -19,6 +19,8 @@ _JOINTS = ("a1", "a2", "a3", "a4", "a5", "a6")
 # Rows that differ by less (rad) are one solution: a merged elbow pair differs by at most twice
 # the merged angle, on each of its joints.
 _SAME = 4 * TOLERANCES.merged
+_POSTURE_BITS = 0b111
+_JOINT_BITS, _A1_BIT, _A4_A6_BITS = 0b111111, 0b1, 0b101000
 
 
 class InverseQuestion(Question):
@@ -103,7 +105,7 @@ class InverseQuestion(Question):
             reason = self._absent(found, index, kept)
             if reason is None:
                 kept.append((index, list(principal)))
-                chosen, reason = self._chosen(list(principal))
+                chosen, reason = self._chosen(found, index)
                 solutions += [self._solution(index, q, flange) for q in chosen]
             if reason is not None:
                 missing.append({"branch": _branch(index), "reason": reason})
@@ -181,14 +183,23 @@ class InverseQuestion(Question):
         moves = [abs(a - b) for a, b in zip(q, self.near, strict=True)]
         return round(max(moves), 9), round(sum(moves), 9)
 
-    def _chosen(self, principal: list[float]) -> tuple[list[list[float]], str | None]:
-        """The full-turn variants to list for a branch, or why none is listed."""
-        if self.status is not None and kuka.status(principal, self.data.geometry) != self.status:
-            s = kuka.status(principal, self.data.geometry)
+    def _chosen(self, found: Solutions, index: int) -> tuple[list[list[float]], str | None]:
+        """The full-turn variants to list for a branch, or why none is listed.
+
+        Status has three bits of posture and Turn one for each joint; higher bits (accuracy flag,
+        external axes) say nothing here, nor do the Turn bits of joints that a singularity frees.
+        """
+        principal = found.angles[index]
+        s = kuka.status(principal, self.data.geometry)
+        if self.status is not None and (s ^ self.status) & _POSTURE_BITS:
             return [], f"not selected: its Status is {s}"
         variants = kuka.full_turn_variants(principal, self.limits)
         if self.turn is not None:
-            matching = [q for q in variants if kuka.turn(q) == self.turn]
+            free = _A1_BIT * bool(found.on_axis) | _A4_A6_BITS * bool(
+                found.straight_wrist[index // 2]
+            )
+            judged = _JOINT_BITS & ~free
+            matching = [q for q in variants if not (kuka.turn(q) ^ self.turn) & judged]
             if not matching:
                 turns = ", ".join(str(kuka.turn(q)) for q in variants)
                 return [], f"not selected: its Turn can be {turns}"
