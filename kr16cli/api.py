@@ -164,10 +164,11 @@ class Robot(Kinematics):
     def task_space(self, q: Like, qd: Like) -> TaskSpaceArrays:
         """Mx, Cx (..., 6, 6), Gx (..., 6), Ja, Ja' for x = (p, phi, theta, psi) of the flange.
 
-        Section 3.6. Near a singularity, or theta = +-90 deg, the numbers grow without bound.
+        Section 3.6. Near a singularity, or theta = +-90 deg, the numbers grow without bound; in a
+        batch, rows without an inverse are NaN.
 
         Raises:
-            NoAnswerError: for one configuration, exactly there.
+            NoAnswerError: for one configuration at such a place.
         """
         angles, rates = arrays.checked("q", q, 6), arrays.checked("qd", qd, 6)
         lead = arrays.batch(["q", "qd"], [angles, rates], [1, 1])
@@ -178,17 +179,18 @@ class Robot(Kinematics):
         angles, rates = (np.broadcast_to(v, (*lead, 6)) for v in (angles, rates))
         flange = Robot(self.data, payload=self.payload, drives=self.drives)
         rpy = orientation.rpy_from_rotation(pose_rows(flange.fk(angles)), ARRAYS)
-        result = task.task_space(
-            (
-                _matrix(flange.mass_matrix(angles)),
-                _matrix(flange.coriolis_matrix(angles, rates)),
-                _vector(flange.gravity(angles)),
-            ),
-            (_matrix(flange.jacobian(angles)), _matrix(flange.jacobian_dot(angles, rates))),
-            ARRAYS.trig(rpy),
-            _vector(rates),
-            lambda rows: _matrix(np.linalg.inv(_stacked(rows, lead))),
-        )
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            result = task.task_space(
+                (
+                    _matrix(flange.mass_matrix(angles)),
+                    _matrix(flange.coriolis_matrix(angles, rates)),
+                    _vector(flange.gravity(angles)),
+                ),
+                (_matrix(flange.jacobian(angles)), _matrix(flange.jacobian_dot(angles, rates))),
+                ARRAYS.trig(rpy),
+                _vector(rates),
+                lambda rows: _matrix(_inverses(_stacked(rows, lead))),
+            )
         gravity = _stacked([result.gravity], lead)[..., 0, :]
         matrices = (result.mass_matrix, result.coriolis_matrix)
         jacobians = (result.jacobian, result.jacobian_dot)
@@ -206,6 +208,14 @@ class Robot(Kinematics):
         s = np.array([status(row, self.data.geometry) for row in rows], dtype=np.int64)
         t = np.array([turn(row) for row in rows], dtype=np.int64)
         return s.reshape(shape), t.reshape(shape)
+
+
+def _inverses(matrices: Array) -> npt.NDArray[np.floating[Any]]:
+    """Inverses (..., n, n); NaN where a matrix has none."""
+    whole = np.asarray(np.isfinite(matrices).all(axis=(-2, -1)))
+    regular = whole & (np.linalg.det(np.where(whole[..., None, None], matrices, 0.0)) != 0.0)
+    safe = np.where(regular[..., None, None], matrices, np.eye(matrices.shape[-1]))
+    return np.where(regular[..., None, None], np.linalg.inv(safe), np.nan)
 
 
 def _vector(values: npt.NDArray[np.floating[Any]]) -> list[Scalar]:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from kr16cli import arrays
 from kr16cli.arrays import Array
-from kr16cli.errors import InputError, NoAnswerError
+from kr16cli.errors import InputError, NoAnswerError, ShapeError
 from kr16cli.kernels import engine_name
 from kr16cli.kernels.columns import ARRAYS, ColumnEngine
 from kr16cli.kernels.parameters import Parameters, parameters
@@ -239,6 +239,9 @@ class Kinematics:
         """How far fk(Q) is from T: position error (m), rotation angle (rad); NaN for NaN rows."""
         q = np.asarray(Q, dtype=np.float64)
         poses = self._poses("T", T)
+        if q.shape[-1:] != (6,):
+            raise ShapeError("Q", q.shape, "(..., 6)")
+        arrays.batch(["T", "Q"], [poses, q], [2, 1])
         known = np.asarray(np.isfinite(q).all(axis=-1, keepdims=True))
         made = self.fk(np.where(known, q, 0.0))
         gaps = orientation.pose_distance(pose_rows(made), pose_rows(poses), ARRAYS)
@@ -263,10 +266,9 @@ class Kinematics:
         """The checked choice of a Jacobian."""
         p: list[float] | None = None
         if point is not None:
-            values = arrays.checked("point", point, 3)
-            if values.ndim != 1:
-                raise InputError(f"point has shape {values.shape}; expected (3,)")
-            p = values.tolist()
+            if np.shape(point) != (3,):
+                raise ShapeError("point", np.shape(point), "(3,)")
+            p = arrays.checked("point", point, 3).tolist()
         elif self.tool is not None and link == 6:
             p = self.tool[:3, 3].tolist()
         return View.of(self.data.geometry, link, p, axes)

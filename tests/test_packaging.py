@@ -102,7 +102,7 @@ def test_extras_are_as_promised() -> None:
         *("fmu", "cross", "report", "cluster", "engines", "test", "all")
     }
     needed = [re.split(r"[^\w-]", line)[0] for line in project["dependencies"]]
-    assert needed == ["numpy", "scipy", "typer"]
+    assert needed == ["mpmath", "numpy", "scipy", "typer"]
     everything = [
         *project["dependencies"],
         *(line for extra in project["optional-dependencies"].values() for line in extra),
