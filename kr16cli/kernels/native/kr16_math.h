@@ -50,7 +50,8 @@ static inline double kr16_atan2(double y, double x)
 {
     const double ax = fabs(x), ay = fabs(y);
     const double low = ay > ax ? ax : ay, high = ay > ax ? ay : ax;
-    const int wide = low > high * 0.41421356237309503; /* above 22.5 deg: turn by 45 deg */
+    /* Above 22.5 deg turn by 45 deg; >= takes two infinities in, as equals. */
+    const int wide = (low >= high * 0.41421356237309503) & (high > 0.0);
     const double turned = low == high ? 0.0 : low - high;
     const double over = high == 0.0 ? 1.0 : high;
     const double t = (wide ? turned : low) / (wide ? low + high : over);
