@@ -289,9 +289,9 @@ class Kinematics:
         the flange for link 6). None is the flange or tool, else that frame's origin. `axes` of
         the rows: robroot, flange or chapter (the chapter's base b).
         """
-        view = self._view(link, point, axes)
-        if view == View(self.data.geometry):
+        if link == 6 and point is None and axes == "robroot" and self.tool is None:
             return self._ask("jacobian", (q,), out, threads)
+        view = self._view(link, point, axes)
         return self._seen("jacobian", view, {"q": q}, out, threads)
 
     def jacobian_dot(
@@ -306,9 +306,9 @@ class Kinematics:
         threads: int = 1,
     ) -> Array:
         """Rate of `jacobian` along qd, (3.47)-(3.51), (..., 6, 6); `axes` stand still."""
-        view = self._view(link, point, axes)
-        if view == View(self.data.geometry):
+        if link == 6 and point is None and axes == "robroot" and self.tool is None:
             return self._ask("jacobian_dot", (q, qd), out, threads)
+        view = self._view(link, point, axes)
         return self._seen("jacobian_dot", view, {"q": q, "qd": qd}, out, threads)
 
     def _seen(

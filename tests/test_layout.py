@@ -34,6 +34,7 @@ _ORDER = (
     {"krl"},
     {"kuka"},
     {"simulate", "export"},
+    {"bench"},
     {"queries"},
     {"verify", "fmi"},
     {"report"},

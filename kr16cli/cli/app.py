@@ -20,6 +20,7 @@ COMMANDS = {
     "verify": "Verify the model and report each case.",
     "report": "Write a report.",
     "fmu": "Build, check and run FMUs.",
+    "bench": "Time the kernels on this machine.",
     "export": "Write the robot as URDF or MJCF.",
     "robot": "Check a parameter file, or write a commented one.",
     "map": "Maps over the workspace.",

@@ -1,0 +1,66 @@
+"""The whole benchmark as one result: own figures, peers, ratios, and what machine it was."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Mapping
+from typing import Any
+
+from kr16cli.api import Robot
+from kr16cli.bench import own, peers
+from kr16cli.kernels import engine_name
+
+SCHEMA = "kr16.bench/1"
+UNITS = {"batch_ns": "ns", "threads_ns": "ns", "call_ns": "ns", "peers": "ns", "gflop_s": "1e9/s"}
+
+
+def bench(robot: Robot, *, n: int, threads: int, rounds: int, with_peers: bool) -> dict[str, Any]:
+    """Measure; ratios are the fastest peer's time over the batch time of this engine."""
+    rows = own.measure(robot, n, threads, rounds)
+    others = peers.measure(robot, own.inputs(robot, n), rounds) if with_peers else {}
+    for row in rows:
+        found = others.get(row["quantity"], {})
+        row["peers"] = found
+        row["ratio"] = min(found.values()) / row["batch_ns"] if found else None
+    return {
+        "schema": SCHEMA,
+        "robot": robot.data.name,
+        "model_sha256": robot.data.sha256,
+        "units": UNITS,
+        "input": {"configurations": n, "threads": threads, "rounds": rounds},
+        "result": {"engine": engine_name(), "machine": machine(), "rows": rows},
+        "warnings": ["wall times of a shared machine drift; compare the ratios of one run"],
+    }
+
+
+def machine() -> dict[str, Any]:
+    """Processor, cores and Python, as far as the system says."""
+    return {
+        "processor": platform.processor() or platform.machine(),
+        "cores": os.cpu_count(),
+        "system": platform.system(),
+        "python": platform.python_version(),
+    }
+
+
+def table(answer: Mapping[str, Any]) -> str:
+    """The figures as text, one quantity a line."""
+    given, result = answer["input"], answer["result"]
+    head = (
+        f"engine {result['engine']}, {given['configurations']} configurations, ns each\n"
+        f"  {'quantity':<18}{'batch':>9}{given['threads']:>3} thr{'one call':>10}{'Gop/s':>8}"
+        f"{'ratio':>8}  fastest peer"
+    )
+    return "\n".join([head, *map(_line, result["rows"])]) + "\n"
+
+
+def _line(row: Mapping[str, Any]) -> str:
+    peer = min(row["peers"], key=row["peers"].get) if row["peers"] else None
+    rate = f"{row['gflop_s']:8.1f}" if "gflop_s" in row else " " * 8
+    ratio = f"{row['ratio']:8.1f}" if row["ratio"] is not None else " " * 8
+    told = f"  {peer} {row['peers'][peer]:.0f} ns" if peer else ""
+    return (
+        f"  {row['quantity']:<18}{row['batch_ns']:9.1f}{row['threads_ns']:7.1f}"
+        f"{row['call_ns']:10.0f}{rate}{ratio}{told}"
+    ).rstrip()

@@ -1,0 +1,50 @@
+"""kr16 bench."""
+
+from typing import Annotated
+
+import typer
+
+from kr16cli.cli import options as o
+from kr16cli.cli import output as out
+from kr16cli.cli import render, run
+from kr16cli.cli.command import Command, new_app
+
+app = new_app()
+
+
+@app.command(cls=Command)
+def bench(
+    ctx: typer.Context,
+    peers: Annotated[bool, typer.Option("--peers", help="Other engines too, if there.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer configurations.")] = False,
+    threads: Annotated[
+        str, typer.Option("--threads", metavar="N", help="Of the second column.")
+    ] = "2",
+    robot: o.Robot = None,
+    format_: o.Format = None,
+    json: o.Json = False,
+    output: o.Output = None,
+) -> None:
+    """Time the kernels on this machine, beside other engines with --peers.
+
+    $ kr16 bench --quick
+    $ kr16 bench --quick --json
+
+    Batches go into an array of the caller's; ratio is the fastest peer's time over the batch's.
+    """
+    from kr16cli.api import Robot
+    from kr16cli.bench import report
+    from kr16cli.errors import InputError
+
+    if not threads.isdigit() or int(threads) < 1:
+        raise InputError(f"--threads is {threads}; it must be a whole number of 1 or more")
+    kind = out.choose_format(format_, json, output, ("table", "json"))
+    with out.Target(output) as target:
+        answer = report.bench(
+            Robot(run.load(ctx)),
+            n=4096 if quick else 100_000,
+            threads=int(threads),
+            rounds=1 if quick else 5,
+            with_peers=peers,
+        )
+        target.write(render.json_text(answer) if kind == "json" else report.table(answer))
