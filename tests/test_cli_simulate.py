@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import importlib.util
 import json
 import os
 import signal
@@ -105,6 +106,63 @@ def test_run_goes_to_the_file_and_summary_to_stdout(
         assert len(rows) == len(archive["time"]) == 6
 
 
+def test_plot_is_a_pdf_of_two_pages_and_the_same_each_time(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("matplotlib")
+    command = "simulate ptp_16kg --duration 0.3 --rtol 1e-4 -o run.npz --plot run.pdf"
+    assert kr16(command) == 0
+    shown, errors = capsys.readouterr()
+    assert "flange from its reference: largest" in shown
+    assert "the end of the reference is not reached" in errors
+    first = (folder / "run.pdf").read_bytes()
+    assert first.startswith(b"%PDF") and b"/Count 2" in first
+    assert b"CreationDate" not in first
+    assert kr16(command) == 0
+    assert (folder / "run.pdf").read_bytes() == first
+    assert files(folder) == ["run.npz", "run.pdf"]
+
+
+def test_plot_without_matplotlib_ends_with_code_4(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "matplotlib" else find(name)
+    )
+    assert kr16(f"simulate {_SHORT} -o run.npz --plot run.pdf") == 4
+    shown, errors = capsys.readouterr()
+    assert shown == "" and "pip install 'kr16cli[report]'" in errors
+    assert files(folder) == []
+
+
+def test_controlled_run_is_told_in_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert kr16("simulate circle_task_space --duration 0.1 --json") == 0
+    answer = json.loads(capsys.readouterr().out)
+    jsonschema.validate(answer, _ENVELOPE)
+    assert answer["result"]["tracking"]["position_largest"] < 1e-3
+    assert answer["result"]["solver"]["step"] == 0.004
+    assert answer["input"]["controller"]["sampling"]["period"] == 0.004
+    assert kr16("simulate circle_task_space --duration 0.1 --step 0.002 --method RK4") == 0
+    assert "solver RK4, step 0.002 s" in capsys.readouterr().out
+
+
+def test_reference_out_of_reach_ends_with_code_3(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    toml = (
+        'schema = "kr16.scenario/1"\nname = "far"\nduration_s = 1\n'
+        '[initial]\nq_deg = [0, -80, 95, 0, 60, 0]\n[controller]\nkind = "pd"\n'
+        '[reference]\nkind = "line"\noffset_mm = [3000, 0, 0]\n'
+    )
+    (folder / "far.toml").write_text(toml)
+    assert kr16("simulate far.toml -o run.npz --plot run.pdf") == 3
+    shown, errors = capsys.readouterr()
+    assert shown == "" and errors.count("\n") == 1
+    assert "leaves the workspace at" in errors and "mm)" in errors
+    assert files(folder) == ["far.toml"]
+
+
 def test_csv_on_stdout_is_the_run_alone(capsys: pytest.CaptureFixture[str]) -> None:
     assert kr16(f"simulate {_SHORT} --format csv") == 0
     lines = capsys.readouterr().out.splitlines()
@@ -140,7 +198,7 @@ def test_other_robot_is_simulated(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("command", "reason"),
     [
-        ("simulate free_swin", "shipped: constant_torque"),
+        ("simulate free_swin", "shipped: circle_task_space, constant_torque"),
         ("simulate --q 0 -90 90 0 0", "--q takes 6 numbers"),
         ("simulate --q 0 -90 nan 0 0 0", "--q A3 is nan; every number must be finite"),
         ("simulate --q 0 -90 900 0 0 0", "initial.q_deg[3] = 900.0: angles are in deg"),
@@ -158,6 +216,9 @@ def test_other_robot_is_simulated(capsys: pytest.CaptureFixture[str]) -> None:
         (f"simulate {_SHORT} --durration 1", "did you mean --duration?"),
         (f"simulate {_SHORT} -o none/run.npz", "cannot be written"),
         (f"simulate {_SHORT} -o run.xyz", "the suffix must be one of"),
+        (f"simulate {_SHORT} --plot run.png", "the suffix must be .pdf"),
+        (f"simulate {_SHORT} --plot none/run.pdf", "cannot be written"),
+        (f"simulate {_SHORT} --step 0.01", "belongs to RK4 or SemiImplicitEuler"),
     ],
 )
 def test_bad_input_ends_with_one_line_and_code_2(

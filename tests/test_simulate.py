@@ -26,6 +26,9 @@ from kr16cli.export.urdf import urdf
 from kr16cli.simulate.events import Event, LimitWatch
 from kr16cli.simulate.experiment import simulate
 from kr16cli.simulate.integrate import sample_times
+from kr16cli.simulate.loop import Sampling
+from kr16cli.simulate.motion_spec import ControllerSpec
+from kr16cli.simulate.plant import Limits, Wrench
 from kr16cli.simulate.run import UNITS, Run, load_run
 from kr16cli.simulate.scenario import (
     Scenario,
@@ -36,7 +39,7 @@ from kr16cli.simulate.scenario import (
     with_options,
 )
 from kr16cli.simulate.scenario_check import METHODS, problems_in
-from kr16cli.simulate.summary import envelope, warnings
+from kr16cli.simulate.summary import envelope, summarise, warnings
 from kr16cli.simulate.torque import Table, read_torque_csv
 
 Array = npt.NDArray[np.float64]
@@ -77,15 +80,45 @@ def test_there_are_scenarios_to_start_from() -> None:
 
 
 @pytest.mark.parametrize("name", _SHIPPED)
-def test_shipped_scenario_runs_to_its_end(name: str, shipped: Callable[[str], Run]) -> None:
+def test_shipped_scenario_runs_to_its_end(
+    name: str, shipped: Callable[[str], Run], data: kr16cli.RobotData
+) -> None:
     run, duration = shipped(name), load_scenario(name).duration
     assert run.failure is None
     assert run.time[0] == 0.0
     assert run.time[-1] == duration
     assert all(np.isfinite(getattr(run, key)).all() for key in UNITS)
-    # Every joule is accounted for: a billionth of the largest energy at stake.
+    # Every joule is accounted for, as exactly as the solver was asked to work.
     scale = run.energy_kinetic.max() + np.ptp(run.energy_potential) + run.work_friction[-1]
-    assert np.abs(run.drift).max() <= 1e-8 * scale
+    assert np.abs(run.drift).max() <= max(1e-8, 5.0 * run.statistics.rtol) * scale
+    assert summarise(run, data)["complete"] is True
+
+
+_FOLLOWING = {
+    "ptp_16kg": (1e-6, 1e-6),
+    "lin_near_wrist_singularity": (1e-6, 1e-6),
+    "circle_task_space": (2e-3, 5e-3),
+    "step_disturbance": (0.02, 0.03),
+}
+
+
+@pytest.mark.parametrize("name", _FOLLOWING)
+def test_shipped_controller_follows_its_reference(name: str, shipped: Callable[[str], Run]) -> None:
+    run = shipped(name)
+    assert run.error is not None and run.q_ref is not None
+    largest, last = run.error.max(axis=0), run.error[-1]
+    assert (largest <= _FOLLOWING[name]).all()
+    assert (last <= 0.2 * np.array(_FOLLOWING[name])).all()
+    moved = np.abs(run.q_ref - run.q_ref[0]).max()
+    assert moved == 0.0 if name == "step_disturbance" else moved > 0.1
+    arrived = [event.kind for event in run.events] == ["target_reached"]
+    assert arrived is (name != "step_disturbance")
+
+
+def test_line_passes_near_the_wrist_singularity(shipped: Callable[[str], Run]) -> None:
+    run = shipped("lin_near_wrist_singularity")
+    assert np.degrees(np.abs(run.q[:, 4]).min()) == pytest.approx(4.0, abs=0.01)
+    assert np.degrees(np.ptp(run.q[:, 3])) > 130.0
 
 
 @pytest.mark.parametrize("name", _SHIPPED)
@@ -353,6 +386,30 @@ def test_used_up_steps_end_the_run(data: kr16cli.RobotData) -> None:
     assert run.time[-1] < BENT.duration
 
 
+def test_fixed_step_that_is_too_long_is_found_out(data: kr16cli.RobotData) -> None:
+    """Regularised friction is stiff: 50 ms are far beyond the stability of RK4."""
+    torque = TorqueSpec("constant", TAU)
+    scenario = replace(BENT, drives=True, torque=torque, solver=SolverSpec("RK4", step=0.05))
+    run = simulate(data, scenario)
+    assert run.failure == "the state is not finite"
+    assert 0.0 <= run.time[-1] < BENT.duration
+    assert all(np.isfinite(getattr(run, key)).all() for key in UNITS)
+
+
+@pytest.mark.parametrize(("method", "bound"), [("RK4", 1e-6), ("SemiImplicitEuler", 2e-2)])
+def test_fixed_steps_give_the_same_motion_between_odd_samples(
+    data: kr16cli.RobotData, method: str, bound: float
+) -> None:
+    scenario = replace(BENT, duration=0.2, output_step=0.0037)
+    exact = simulate(data, scenario)
+    run = simulate(data, replace(scenario, solver=SolverSpec(method, step=0.004)))
+    assert len(run.time) == len(exact.time)
+    assert np.abs(run.q - exact.q).max() < bound
+    assert np.abs(run.qd - exact.qd).max() < 100 * bound
+    assert run.statistics.steps == 50
+    assert run.statistics.evaluations == (200 if method == "RK4" else 50) + 1
+
+
 def test_what_a_real_robot_would_not_do_is_said(data: kr16cli.RobotData) -> None:
     heavy = replace(BENT, duration=0.01, payload=kr16cli.Payload(20.0), qd=(3.0,) + (0.0,) * 5)
     torque = TorqueSpec("constant", (0.0, 0.0, 0.0, 0.0, 0.0, -107.0))
@@ -418,7 +475,8 @@ def test_csv_names_every_unit_and_loses_no_digit(data: kr16cli.RobotData) -> Non
     header, *rows = csv.reader(StringIO(run.to_csv()))
     assert header[:2] == ["time [s]", "q1 [rad]"]
     assert {"qd6 [rad/s]", "qdd1 [rad/s2]", "tau6 [N m]", "x [m]", "c [rad]"} < set(header)
-    assert header[-4:-2] == ["energy_kinetic [J]", "energy_potential [J]"]
+    assert header[-6:-4] == ["energy_kinetic [J]", "energy_potential [J]"]
+    assert header[-2:] == ["work_wrench [J]", "work_contact [J]"]
     table = np.array(rows, dtype=float)
     assert np.array_equal(table[:, 0], run.time)
     assert np.array_equal(table[:, 1:7], run.q)
@@ -452,12 +510,25 @@ _GOOD: dict[str, Any] = {
     "solver": {"method": "RK45", "rtol": 1e-6, "atol": 1e-8, "max_steps": 10},
 }
 
+# The same with a controller.
+_DRIVEN: dict[str, Any] = {
+    "schema": "kr16.scenario/1",
+    "name": "driven",
+    "duration_s": 1.0,
+    "initial": {"q_deg": [0, -90, 90, 0, 0, 0]},
+    "limits": {"joint": "contact", "torque": True, "speed": True, "depth_deg": 1, "bounce": 0.1},
+    "wrench": {"moment_nm": [1, 2, 3], "axes": "flange", "start_s": 0.5},
+    "controller": {"kind": "pd"},
+    "reference": {"kind": "ptp", "q_deg": [10, -90, 90, 0, 30, 0], "speed_percent": 50},
+    "solver": {"method": "SemiImplicitEuler", "step_s": 0.001},
+}
+
 _DROP = object()
 
 
-def _with(changes: dict[str, Any]) -> dict[str, Any]:
+def _with(changes: dict[str, Any], good: dict[str, Any] = _GOOD) -> dict[str, Any]:
     """The good table with dotted keys set, or dropped."""
-    table = copy.deepcopy(_GOOD)
+    table = copy.deepcopy(good)
     for dotted, value in changes.items():
         *path, last = dotted.split(".")
         place = table
@@ -515,9 +586,64 @@ _BAD: list[tuple[dict[str, Any], str, str]] = [
     ({"solver.atol": 0}, "solver.atol", "must be >= 1e-15"),
     ({"solver.max_steps": 0}, "solver.max_steps", "whole number of 1 or more"),
     ({"solver.max_steps": 1.5}, "solver.max_steps", "whole number of 1 or more"),
+    ({"solver": {"method": "RK4", "rtol": 1e-6}}, "solver.rtol", "means nothing to a fixed step"),
+    ({"solver": {"method": "RK45", "step_s": 1e-3}}, "solver.step_s", "belongs to RK4 or"),
+    ({"solver": {"method": "RK4", "step_s": 5}}, "solver.step_s", "at most 0.1"),
+    ({"limits": {"joint": "hard"}}, "limits.joint", "one of report, stop, contact"),
+    ({"limits": {"torque": 1}}, "limits.torque", "must be true or false"),
+    ({"limits": {"joint": "stop", "bounce": 1.0}}, "limits.bounce", 'belongs to joint = "contact"'),
+    ({"limits": {"joints": "stop"}}, "limits.joints", "did you mean joint?"),
+    ({"wrench": {}}, "wrench.force_n", "force_n, moment_nm or both"),
+    ({"wrench": {"force_n": [1, 2]}}, "wrench.force_n", "list of 3 numbers"),
+    ({"wrench": {"force_n": [1, 2, 3], "axes": "tool"}}, "wrench.axes", "robroot, flange"),
+    ({"reference": {"kind": "hold"}}, "reference", "needs a [controller]"),
+    ({"controller": {"kind": "zero"}}, "torque", "stands beside [controller]"),
+]
+_LOOP: list[tuple[dict[str, Any], str, str]] = [
+    ({"controller.kind": "pid"}, "controller.kind", "one of zero, gravity, pd"),
+    ({"controller.kind": _DROP}, "controller.kind", "this key is needed"),
+    ({"controller.gain": 3}, "controller.gain", "unknown key"),
+    ({"controller.damping_ratio": 0}, "controller.damping_ratio", "must be > 0"),
+    ({"controller.kp": [1] * 6}, "controller.kd", "kp needs it"),
+    (
+        {"controller.kp": [1] * 6, "controller.kd": [1] * 6, "controller.natural_frequency": 3},
+        "controller.natural_frequency",
+        "stands beside kp and kd",
+    ),
+    ({"controller.kp": [-1] * 6}, "controller.kp[1]", "must be >= 0"),
+    ({"controller.near_singular": 0.1}, "controller.near_singular", 'belongs to kind = "task'),
+    ({"controller.delay_s": 0.1}, "controller.period_s", "delay_s needs it"),
+    ({"controller.period_s": 4}, "controller.period_s", "looks like ms"),
+    ({"controller.kind": "gravity"}, "reference", 'means nothing to the controller "gravity"'),
+    ({"reference": _DROP}, "reference", 'controller "pd" needs it'),
+    ({"reference.kind": "spline"}, "reference.kind", "one of hold, ptp, line"),
+    ({"reference.q": [0.0] * 6}, "reference.q", "stands beside q_deg"),
+    ({"reference.q_deg": _DROP}, "reference.q", 'kind = "ptp" needs it, or q_deg'),
+    ({"reference.speed_m_s": 1}, "reference.speed_m_s", 'means nothing to kind = "ptp"'),
+    ({"reference.speed_percent": 120}, "reference.speed_percent", "at most 100"),
+    ({"reference.acceleration_deg_s2": [1, 2]}, "reference.acceleration_deg_s2", "list of 6"),
+    ({"reference.profile": "cubic"}, "reference.profile", "one of quintic, trapezoid"),
+    ({"reference": {"kind": "csv"}}, "reference.file", 'kind = "csv" needs it'),
+    ({"reference": {"kind": "krl", "program": " "}}, "reference.program", "a statement a line"),
+    ({"reference": {"kind": "line"}}, "reference.position_mm", "needs it, or offset_mm"),
+    (
+        {"reference": {"kind": "line", "offset_mm": [1, 2, 30000]}},
+        "reference.offset_mm[3]",
+        "at most 20000",
+    ),
+    (
+        {"reference": {"kind": "circle", "centre_offset_mm": [0, 0, 1]}},
+        "reference.normal",
+        'kind = "circle" needs it',
+    ),
 ]
 # Rules that a JSON Schema cannot say.
 _BEYOND_SCHEMA: list[tuple[dict[str, Any], str, str]] = [
+    (
+        {"wrench": {"force_n": [1, 2, 3], "start_s": 2, "end_s": 1}},
+        "wrench.end_s",
+        "must come after start_s = 2",
+    ),
     ({"output_step_s": 2.0}, "output_step_s", "must not exceed duration_s = 1"),
     ({"output_step_s": 1e-8}, "output_step_s", "samples, more than 1000000"),
     ({"duration_s": float("nan")}, "duration_s", "must be finite"),
@@ -544,7 +670,65 @@ def test_schema_refuses_what_the_loader_refuses(
     assert not jsonschema.Draft202012Validator(_SCHEMA).is_valid(_with(changes))
 
 
-@pytest.mark.parametrize("table", [{}, [], {"initial": []}, {"torque": {"kind": []}}, None])
+@pytest.mark.parametrize(("changes", "key", "rule"), _LOOP)
+def test_bad_controller_or_reference_is_refused(
+    changes: dict[str, Any], key: str, rule: str
+) -> None:
+    table = _with(changes, _DRIVEN)
+    with pytest.raises(ParameterError) as caught:
+        parse_scenario(table, "test.toml")
+    assert caught.value.key == key
+    assert rule in caught.value.rule
+    assert not jsonschema.Draft202012Validator(_SCHEMA).is_valid(table)
+
+
+@pytest.mark.parametrize(
+    ("centre", "normal", "key"),
+    [
+        ([0, 0, 0], [1, 0, 0], "centre_offset_mm"),
+        ([0, 0, 100], [0, 0, 0], "normal"),
+        ([0, 10, 100], [0, 0, 1], "centre_offset_mm"),
+    ],
+)
+def test_circle_that_is_none_is_refused(centre: list[int], normal: list[int], key: str) -> None:
+    circle = {"kind": "circle", "centre_offset_mm": centre, "normal": normal}
+    with pytest.raises(ParameterError) as caught:
+        parse_scenario(_with({"reference": circle}, _DRIVEN), "test.toml")
+    assert caught.value.key == f"reference.{key}"
+
+
+def test_driven_table_means_what_it_says() -> None:
+    jsonschema.Draft202012Validator(_SCHEMA).validate(_DRIVEN)
+    scenario = parse_scenario(_DRIVEN, "test.toml")
+    assert scenario.limits == Limits("contact", True, True, np.radians(1.0), 0.1)
+    assert scenario.wrench == Wrench((0, 0, 0), (1, 2, 3), "flange", 0.5, None)
+    assert scenario.controller == ControllerSpec("pd")
+    assert scenario.reference is not None
+    assert scenario.reference.end == pytest.approx(np.radians([10, -90, 90, 0, 30, 0]))
+    assert scenario.reference.speed_part == 0.5
+    assert scenario.solver_used() == SolverSpec("SemiImplicitEuler", step=0.001)
+    assert json.loads(json.dumps(scenario.describe())) == scenario.describe()
+    sampled = _with({"controller.period_s": 0.004, "controller.delay_s": 0.002}, _DRIVEN)
+    del sampled["solver"]
+    scenario = parse_scenario(sampled, "test.toml")
+    assert scenario.controller is not None
+    assert scenario.controller.sampling == Sampling(0.004, 0.002)
+    assert scenario.solver_used() == SolverSpec("RK4", step=0.004)
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        {},
+        [],
+        {"initial": []},
+        {"torque": {"kind": []}},
+        None,
+        {"controller": [], "reference": 3, "limits": 1, "wrench": "x"},
+        {"controller": {"kind": []}, "reference": {"kind": {}, "program": 3, "normal": "xyz"}},
+        {"reference": {"kind": "circle", "centre_offset_mm": ["a", 1, 2], "normal": [1]}},
+    ],
+)
 def test_check_never_raises(table: Any) -> None:
     assert problems_in(table, "x")
 
@@ -593,5 +777,7 @@ def test_options_replace_values_of_the_file(tmp_path: Path) -> None:
     assert changed.solver == SolverSpec("RK45", 1e-6)
     assert changed.torque == TorqueSpec()
     assert changed.payload == LOAD
+    driven = with_options("step_disturbance", {"torque": {"kind": "zero"}, "duration_s": 0.5})
+    assert driven.controller is None and driven.reference is None
     with pytest.raises(ParameterError, match="options: duration_s = -1"):
         with_options(path, {"duration_s": -1.0})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,7 +12,7 @@ import typer
 
 from kr16cli.cli import batch, render, values
 from kr16cli.cli import output as out
-from kr16cli.errors import CheckFailedError
+from kr16cli.errors import CheckFailedError, InputError
 
 if TYPE_CHECKING:
     from kr16cli.robot import RobotData
@@ -46,8 +47,16 @@ Method = Annotated[
     typer.Option(
         "--method",
         metavar="NAME",
-        help="auto, DOP853, RK45, Radau or LSODA; auto is DOP853, with --drives LSODA.",
+        help="auto, DOP853, RK45, Radau, LSODA, RK4 or SemiImplicitEuler; auto is DOP853, "
+        "with --drives LSODA.",
     ),
+]
+Step = Annotated[
+    str | None,
+    typer.Option("--step", metavar="S", help="Step of RK4 and SemiImplicitEuler, 0.004 s."),
+]
+Plot = Annotated[
+    str | None, typer.Option("--plot", metavar="FILE.pdf", help="Draw the run; needs matplotlib.")
 ]
 Rtol = Annotated[
     str | None, typer.Option("--rtol", metavar="X", help="Relative tolerance of a step, 1e-9.")
@@ -72,8 +81,11 @@ def scenario(p: Mapping[str, Any]) -> Scenario | None:
         "gravity": values.option(p["gravity"], "XYZ", "--gravity"),
         "initial": {"q" if si else "q_deg": q, "qd" if si else "qd_deg_s": qd},
         "torque": _torque(p),
-        "solver": {"method": p["method"], "rtol": _number(p, "rtol"), "atol": _number(p, "atol")},
-    }
+        "solver": {
+            "method": p["method"], "rtol": _number(p, "rtol"), "atol": _number(p, "atol"),
+            "step_s": _number(p, "step"),
+        },
+    }  # fmt: skip
     load = values.payload(p["payload"], p["load_data"], si=si)
     return with_options(p["scene"], options, load)
 
@@ -105,7 +117,7 @@ def simulate(p: Mapping[str, Any], data: RobotData, asked: Scenario) -> None:
     file = p["output"] not in (None, "-")
     record = file and (p["format_"] or Path(p["output"]).suffix[1:]).lower() in ("csv", "npz")
     kind = out.choose_format(p["format_"], p["json"] and not record, p["output"])
-    with out.Target(p["output"]) as target:
+    with out.Target(p["output"]) as target, _plot(p["plot"], p["output"]) as picture:
         from kr16cli.simulate.experiment import simulate as experiment
         from kr16cli.simulate.summary import envelope
 
@@ -116,11 +128,29 @@ def simulate(p: Mapping[str, Any], data: RobotData, asked: Scenario) -> None:
             "json": lambda: render.json_text(answer), "table": lambda: table(answer, si=p["si"]),
         }  # fmt: skip
         target.write(texts[kind]())
+        if isinstance(picture, out.Target):
+            from kr16cli.report.motion_figures import motion_pdf
+
+            picture.write(motion_pdf(run, data.joints))
         if record:
             out.Target(None).write(texts["json" if p["json"] else "table"]())
     batch.warn(answer["warnings"])
     if run.failure:
         raise CheckFailedError(_failed(answer["result"]))
+
+
+def _plot(file: str | None, output: str | None) -> AbstractContextManager[object]:
+    """The file of a plot, opened; MissingPartError at once if it could not be drawn."""
+    if file is None:
+        return nullcontext()
+    if Path(file).suffix.lower() != ".pdf":
+        raise InputError(f"--plot {file}: the suffix must be .pdf")
+    if output is not None and Path(file).resolve() == Path(output).resolve():
+        raise InputError(f"--plot {file}: is the file of -o, too; give another name")
+    from kr16cli.report.motion_figures import require_matplotlib
+
+    require_matplotlib()
+    return out.Target(file)
 
 
 def _failed(result: Mapping[str, Any]) -> str:
@@ -173,12 +203,37 @@ def table(answer: Mapping[str, Any], *, si: bool = False) -> str:
             ),
             f"  work of torques {energy['work_torque']:.6g}, lost in friction "
             f"{energy['work_friction']:.6g}, unexplained at most {energy['drift_max']:.1e}",
+            *(
+                f"  work of the {name} {energy[f'work_{name}']:.6g}"
+                for name in ("wrench", "contact")
+                if energy[f"work_{name}"]
+            ),
             *(f"event at {e['time']:.6f} s: {e['joint']} {e['kind']}" for e in result["events"]),
-            f"solver {solver['method']}, rtol {solver['rtol']:g}, atol {solver['atol']:g}: "
+            *([_tracking(result["tracking"], si=si)] if result["tracking"] else []),
+            f"solver {solver['method']}, {_accuracy(solver)}: "
             f"{solver['steps']} steps, {solver['evaluations']} evaluations",
             "",
         ]
     )
+
+
+def _tracking(tracking: Mapping[str, float], *, si: bool) -> str:
+    """How far the flange was from its reference, in a line."""
+    from kr16cli import units
+
+    length, angle = (1.0, 1.0) if si else (units.mm(1.0), units.deg(1.0))
+    shown = [
+        f"{when} {length * tracking[f'position_{when}']:.3g} {'m' if si else 'mm'}, "
+        f"{angle * tracking[f'angle_{when}']:.3g} {'rad' if si else 'deg'}"
+        for when in ("largest", "final")
+    ]
+    return "flange from its reference: " + "; ".join(shown)
+
+
+def _accuracy(solver: Mapping[str, Any]) -> str:
+    if solver["step"] is not None:
+        return f"step {solver['step']:g} s"
+    return f"rtol {solver['rtol']:g}, atol {solver['atol']:g}"
 
 
 def _progress(duration: float) -> Callable[[float], None]:

@@ -32,6 +32,8 @@ def simulate(
     method: m.Method = None,
     rtol: m.Rtol = None,
     atol: m.Atol = None,
+    step: m.Step = None,
+    plot: m.Plot = None,
     si: o.Si = False,
     robot: o.Robot = None,
     format_: o.Format = None,
@@ -41,11 +43,12 @@ def simulate(
     """Simulate a motion: a scenario file, a shipped scenario, or options.
 
     $ kr16 simulate free_swing -o swing.npz
+    $ kr16 simulate step_disturbance --duration 0.6 -o push.csv
     $ kr16 simulate --q 0 -60 60 0 30 0 --duration 0.5 --torque gravity --json
 
     An option replaces the scenario's value. CSV and npz hold every sample, in SI units; the
-    summary goes to stdout. Joint limits are reported, not enforced. If the solver fails, the
-    run so far is written and marked, and the exit code is 1.
+    summary goes to stdout. A scenario says what joint limits do; by default they are reported. If
+    the solver fails, the run so far is written and marked, and the exit code is 1.
     """
     asked = m.scenario(ctx.params)
     if asked is None:

@@ -30,10 +30,17 @@ UNITS = {
     "energy_potential": "J",
     "work_torque": "J",
     "work_friction": "J",
+    "work_wrench": "J",
+    "work_contact": "J",
 }
 """The arrays of a run and their units."""
 
-_POSE = ("x", "y", "z", "a", "b", "c")
+REFERENCE_UNITS = {"q_ref": "rad", "error": "m rad"}
+"""The arrays of a run that follows a reference."""
+
+WORK_NAMES = ("work_torque", "work_friction", "work_wrench", "work_contact")
+
+_PARTS = {"pose": tuple("xyzabc"), "error": ("error_position", "error_angle")}
 _EVENT = np.dtype([("time", "f8"), ("joint", "U8"), ("kind", "U16"), ("value", "f8")])
 
 
@@ -44,15 +51,19 @@ class Run:
     Attributes:
         time: (n,) s; the first is 0, the last the duration of a complete run.
         q, qd, qdd: (n, 6) joint angles, speeds and accelerations.
-        tau: (n, 6) applied torques, N m; friction is not in them.
+        tau: (n, 6) torques that the drives gave, N m; friction is not in them.
         pose: (n, 6) x, y, z (m) and A, B, C (rad) of the flange in robroot.
         energy_kinetic, energy_potential: (n,) J.
         work_torque, work_friction: (n,) J done by the torques and lost in friction so far.
-        events: joints passing their limits, in order of time.
+        work_wrench, work_contact: (n,) J done by the external wrench and by joint stops.
+        events: joints passing their limits, a target reached, in order of time.
         statistics: what the solver was asked, and did.
         failure: why the run ended before its time, or None.
         scenario: the scenario as a table in SI units.
         robot: name of the robot; `model_sha256` the hash of its parameter file's numbers.
+        q_ref: (n, 6) reference angles, or None without a reference.
+        error: (n, 2) distance (m) and angle (rad) of the flange from its reference, or None.
+        stopped: why a run ended early as it was asked to, or None.
     """
 
     time: Array
@@ -65,18 +76,34 @@ class Run:
     energy_potential: Array
     work_torque: Array
     work_friction: Array
+    work_wrench: Array
+    work_contact: Array
     events: tuple[Event, ...]
     statistics: Statistics
     failure: str | None
     scenario: Mapping[str, Any]
     robot: str
     model_sha256: str
+    q_ref: Array | None = None
+    error: Array | None = None
+    stopped: str | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run lasted as long as it was to."""
+        return self.failure is None and self.stopped is None
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The arrays this run has, and their units."""
+        return UNITS if self.q_ref is None else UNITS | REFERENCE_UNITS
 
     @property
     def drift(self) -> Array:
         """(n,) J: change of energy that no work explains; the integration's error."""
         energy = self.energy_kinetic + self.energy_potential
-        unexplained: Array = energy - energy[0] - (self.work_torque - self.work_friction)
+        work = self.work_torque - self.work_friction + self.work_wrench + self.work_contact
+        unexplained: Array = energy - energy[0] - work
         return unexplained
 
     def metadata(self) -> dict[str, Any]:
@@ -89,10 +116,11 @@ class Run:
             "robot": self.robot,
             "model_sha256": self.model_sha256,
             "scenario": dict(self.scenario),
-            "complete": self.failure is None,
+            "complete": self.complete,
             "failure": self.failure,
+            "stopped": self.stopped,
             "solver": self.statistics._asdict(),
-            "units": UNITS,
+            "units": self.units,
         }
 
     def to_npz(self) -> bytes:
@@ -103,7 +131,7 @@ class Run:
         out = BytesIO()
         np.savez(
             out,
-            **{name: getattr(self, name) for name in UNITS},
+            **{name: getattr(self, name) for name in self.units},
             events=np.array(list(map(tuple, self.events)), dtype=_EVENT),
             metadata=np.array(json.dumps(self.metadata(), ensure_ascii=False)),
         )
@@ -115,16 +143,16 @@ class Run:
         A run that ended before its time has a last column `status` that says so in each row.
         """
         header, columns = ["time [s]"], [self.time[:, None]]
-        for name, unit in list(UNITS.items())[1:]:
+        for name, unit in list(self.units.items())[1:]:
             values = np.asarray(getattr(self, name))
             columns.append(values.reshape(len(self.time), -1))
-            if name == "pose":
-                header += [f"{n} [{u}]" for n, u in zip(_POSE, unit.split(), strict=True)]
+            if name in _PARTS:
+                header += [f"{n} [{u}]" for n, u in zip(_PARTS[name], unit.split(), strict=True)]
             elif values.ndim == 1:
                 header.append(f"{name} [{unit}]")
             else:
                 header += [f"{name}{i} [{unit}]" for i in range(1, 7)]
-        mark = [] if self.failure is None else ["partial"]
+        mark = [] if self.complete else ["partial"]
         out = StringIO()
         writer = csv.writer(out, lineterminator="\n")
         writer.writerow(header + ["status"] * len(mark))
@@ -141,7 +169,8 @@ def load_run(path: str | Path) -> Run:
     """
     try:
         with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {name: np.asarray(archive[name], dtype=np.float64) for name in UNITS}
+            known = [*UNITS, *(name for name in REFERENCE_UNITS if name in archive)]
+            arrays = {name: np.asarray(archive[name], dtype=np.float64) for name in known}
             events = [Event(*record) for record in archive["events"].tolist()]
             about = json.loads(str(archive["metadata"]))
         return Run(
@@ -152,6 +181,7 @@ def load_run(path: str | Path) -> Run:
             scenario=about["scenario"],
             robot=about["robot"],
             model_sha256=about["model_sha256"],
+            stopped=about.get("stopped"),
         )
     except OSError as error:
         raise FileError(path, f"cannot be read: {error.strerror or error}") from None

@@ -11,11 +11,34 @@ from typing import Any, Literal, cast
 from kr16cli.assets import asset
 from kr16cli.errors import FileError
 from kr16cli.robot import Inertia6, Payload, Vector3
-from kr16cli.simulate.scenario_check import DEFAULT_STEP, SCHEMA, problems_in
+from kr16cli.simulate.motion_spec import (
+    ControllerSpec,
+    ReferenceSpec,
+    Six,
+    controller_of,
+    limits_of,
+    reference_of,
+    wrench_of,
+)
+from kr16cli.simulate.plant import Limits, Wrench
+from kr16cli.simulate.scenario_check import DEFAULT_STEP, FIXED, SCHEMA, problems_in
 from kr16cli.units import rad
 
-Six = tuple[float, float, float, float, float, float]
+__all__ = [
+    "Scenario",
+    "Six",
+    "SolverSpec",
+    "TorqueSpec",
+    "load_scenario",
+    "parse_scenario",
+    "read_table",
+    "with_options",
+]
+
 Kind = Literal["zero", "constant", "gravity", "csv"]
+
+FIXED_STEP = 0.004
+"""Step of a method without error control where none is given, s."""
 
 _ZEROS: Six = (0.0,) * 6
 
@@ -37,15 +60,18 @@ class TorqueSpec:
 class SolverSpec:
     """How the equations of motion are integrated.
 
-    `method` is one of SciPy's solvers; "auto" is DOP853, or LSODA with drives: their friction
-    makes joints nearly at rest stiff, and an explicit method slow. `rtol` and `atol` (rad,
-    rad/s) bound the error of a step; more than `max_steps` steps end the run as failed.
+    `method` is one of SciPy's solvers, or "RK4" or "SemiImplicitEuler" with a fixed `step` (s),
+    shortened to fit between breaks. "auto" is LSODA with drives, whose friction makes joints
+    nearly at rest stiff, RK4 under a sampled controller, else DOP853. `rtol` and `atol` (rad,
+    rad/s) bound the error of an adaptive step; more than `max_steps` steps end the run as
+    failed.
     """
 
     method: str = "auto"
     rtol: float = 1e-9
     atol: float = 1e-10
     max_steps: int = 100_000
+    step: float | None = None
 
 
 @dataclass(frozen=True)
@@ -54,6 +80,7 @@ class Scenario:
 
     `gravity` (m/s2, robroot) is None for that of the robot's file; `output_step` (s) is the
     distance of the samples of the run, whose last is at `duration` (s) whatever the step.
+    A `controller` drives the joints in place of `torque`, along the `reference`.
     """
 
     name: str
@@ -66,21 +93,29 @@ class Scenario:
     drives: bool = False
     gravity: Vector3 | None = None
     solver: SolverSpec = SolverSpec()
+    limits: Limits = field(default_factory=Limits)
+    wrench: Wrench | None = None
+    controller: ControllerSpec | None = None
+    reference: ReferenceSpec | None = None
     description: str = ""
     folder: Path = field(default=Path(), compare=False)
 
     def solver_used(self) -> SolverSpec:
-        """The solver with a method by name in place of "auto"."""
-        if self.solver.method != "auto":
-            return self.solver
-        return replace(self.solver, method="LSODA" if self.drives else "DOP853")
+        """The solver with a method by name in place of "auto", and its step."""
+        solver, loop = self.solver, self.controller
+        if solver.method == "auto":
+            sampled = loop is not None and loop.sampling is not None
+            method = "LSODA" if self.drives else "RK4" if sampled else "DOP853"
+            solver = replace(solver, method=method)
+        if solver.method in FIXED and solver.step is None:
+            return replace(solver, step=FIXED_STEP)
+        return solver
 
     def describe(self) -> dict[str, Any]:
         """The scenario as a JSON-ready table in SI units; what is None is left out."""
         table = asdict(self)
         del table["folder"]
-        table["torque"] = {k: v for k, v in table["torque"].items() if v is not None}
-        return cast("dict[str, Any]", _lists({k: v for k, v in table.items() if v is not None}))
+        return cast("dict[str, Any]", _plain(table))
 
 
 def load_scenario(path: str | Path) -> Scenario:
@@ -123,6 +158,9 @@ def with_options(
         own = {k: v for k, v in given.pop(key, {}).items() if v is not None}
         kept = {k: v for k, v in table.get(key, {}).items() if not _same(k, own)}
         table[key] = kept | own
+    if "torque" in given:  # it takes the place of a controller
+        table.pop("controller", None)
+        table.pop("reference", None)
     scenario = parse_scenario(table | given, "options", Path() if "torque" in given else folder)
     return scenario if payload is None else replace(scenario, payload=payload)
 
@@ -159,7 +197,11 @@ def parse_scenario(table: Mapping[str, Any], path: str, folder: Path = Path()) -
         payload=_payload(table["payload"]) if "payload" in table else None,
         drives=table.get("drives", False),
         gravity=None if gravity is None else cast("Vector3", _numbers(gravity)),
-        solver=SolverSpec(**table.get("solver", {})),
+        solver=_solver(table.get("solver", {})),
+        limits=limits_of(table.get("limits", {})),
+        wrench=wrench_of(table["wrench"]) if "wrench" in table else None,
+        controller=controller_of(table["controller"]) if "controller" in table else None,
+        reference=reference_of(table["reference"]) if "reference" in table else None,
         folder=folder,
     )
 
@@ -202,6 +244,11 @@ def _angles(initial: Mapping[str, Any], key: str, key_deg: str) -> Six:
     return cast("Six", _numbers(initial.get(key, _ZEROS)))
 
 
+def _solver(table: Mapping[str, Any]) -> SolverSpec:
+    given = {key: value for key, value in table.items() if key != "step_s"}
+    return SolverSpec(**given, step=table.get("step_s"))
+
+
 def _torque(table: Mapping[str, Any]) -> TorqueSpec:
     tau = table.get("tau_nm")
     return TorqueSpec(
@@ -224,8 +271,10 @@ def _numbers(values: Sequence[float]) -> tuple[float, ...]:
     return tuple(float(v) + 0.0 for v in values)
 
 
-def _lists(value: Any) -> Any:
-    """Tuples as lists, as JSON has them."""
+def _plain(value: Any) -> Any:
+    """Tuples as lists, named ones as tables, as JSON has them; what is None is left out."""
+    if hasattr(value, "_asdict"):
+        value = value._asdict()
     if isinstance(value, Mapping):
-        return {key: _lists(item) for key, item in value.items()}
-    return [_lists(item) for item in value] if isinstance(value, tuple) else value
+        return {key: _plain(item) for key, item in value.items() if item is not None}
+    return [_plain(item) for item in value] if isinstance(value, tuple | list) else value

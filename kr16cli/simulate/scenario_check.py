@@ -11,11 +11,12 @@ from typing import Any, cast
 
 from kr16cli.errors import ParameterError
 from kr16cli.robot import Inertia6
-from kr16cli.robot_check import Checker
 from kr16cli.robot_rules import GRAVITY, INERTIA, LENGTH, MASS, Quantity, inertia_problem
+from kr16cli.simulate.motion_spec import FOLLOWERS, MotionChecker
 
 SCHEMA = "kr16.scenario/1"
 METHODS = ("auto", "DOP853", "RK45", "Radau", "LSODA")
+FIXED = ("RK4", "SemiImplicitEuler")
 KINDS = ("zero", "constant", "gravity", "csv")
 MOST_SAMPLES = 1_000_000
 DEFAULT_STEP = 0.01
@@ -32,8 +33,10 @@ SOLVER = {
     "rtol": Quantity("relative tolerances", "", 0.1, low=1e-13),
     "atol": Quantity("absolute tolerances", "", 0.1, low=1e-15),
 }
+STEP = Quantity("steps", "s", 0.1, "ms", 0.0, True)
 _INITIAL = {"q": ANGLE, "q_deg": ANGLE_DEG, "qd": SPEED, "qd_deg_s": SPEED_DEG_S}
-_OPTIONAL = ("description", "output_step_s", "drives", "gravity", "torque", "payload", "solver")
+_GROUPS = ("initial", "torque", "payload", "limits", "wrench", "controller", "reference", "solver")
+_OPTIONAL = ("description", "output_step_s", "drives", "gravity", *_GROUPS[1:])
 _TORQUE_KEYS = {"constant": "tau_nm", "csv": "file"}
 
 
@@ -49,7 +52,7 @@ def problems_in(table: Mapping[str, Any], path: str) -> list[ParameterError]:
     return checker.found
 
 
-class _ScenarioChecker(Checker):
+class _ScenarioChecker(MotionChecker):
     """Collects problems; every method takes the dotted key of what it looks at."""
 
     def scenario(self, table: Mapping[str, Any]) -> None:
@@ -63,14 +66,26 @@ class _ScenarioChecker(Checker):
         self.numbers(table, "", "gravity", [GRAVITY] * 3)
         if not isinstance(table.get("drives", False), bool):
             self.fail("drives", table["drives"], "must be true or false")
-        for name, check in (
-            ("initial", self.initial),
-            ("torque", self.torque),
-            ("payload", self.payload),
-            ("solver", self.solver),
-        ):
+        for name in _GROUPS:
             if name in table and self.is_table(table[name], name):
-                check(table[name])
+                getattr(self, name)(table[name])
+        self.together(table)
+
+    def together(self, table: Mapping[str, Any]) -> None:
+        """Groups that contradict or need one another."""
+        controller, reference = table.get("controller"), table.get("reference")
+        if controller is not None and "torque" in table:
+            self.fail("torque", table["torque"], "stands beside [controller]; give one")
+        kind = controller.get("kind") if isinstance(controller, Mapping) else None
+        if reference is not None and (controller is None or kind in ("zero", "gravity")):
+            what = (
+                "needs a [controller] that follows it"
+                if controller is None
+                else (f'means nothing to the controller "{kind}"')
+            )
+            self.fail("reference", reference, what)
+        if reference is None and kind in FOLLOWERS:
+            self.fail("reference", None, f'controller "{kind}" needs it; kind = "hold" stays')
 
     def times(self, table: Mapping[str, Any]) -> None:
         """The duration, the output step, and how many samples they make."""
@@ -120,10 +135,15 @@ class _ScenarioChecker(Checker):
             self.fail("payload.inertia", table["inertia"], f"{rule}; a point load has none")
 
     def solver(self, table: Mapping[str, Any]) -> None:
-        self.keys(table, "solver", (), ("method", *SOLVER, "max_steps"))
-        self.choice(table, "solver", "method", METHODS)
+        self.keys(table, "solver", (), ("method", *SOLVER, "step_s", "max_steps"))
+        self.choice(table, "solver", "method", METHODS + FIXED)
+        self.number(table, "solver", "step_s", STEP)
         for key, quantity in SOLVER.items():
             self.number(table, "solver", key, quantity)
+            if key in table and table.get("method") in FIXED:
+                self.fail(f"solver.{key}", table[key], "means nothing to a fixed step; give step_s")
+        if "step_s" in table and table.get("method", "auto") in METHODS:
+            self.fail("solver.step_s", table["step_s"], f"belongs to {' or '.join(FIXED)}")
         steps = table.get("max_steps", 1)
         if not isinstance(steps, int) or isinstance(steps, bool) or steps < 1:
             self.fail("solver.max_steps", steps, "must be a whole number of 1 or more")

@@ -8,12 +8,13 @@ import numpy as np
 
 from kr16cli.arrays import Array
 from kr16cli.robot import RobotData
+from kr16cli.simulate.events import ARRIVAL
 from kr16cli.simulate.run import UNITS, Run
 from kr16cli.units import deg
 
 SCHEMA = "kr16.simulate/1"
 _FINAL = ("time", "q", "qd", "qdd", "tau", "pose")
-_UNITS = {"drift": "J", "value": "rad", **UNITS}
+_UNITS = {"drift": "J", "value": "rad", "tracking": "m rad", **UNITS}
 
 
 def envelope(run: Run, data: RobotData) -> dict[str, Any]:
@@ -35,8 +36,9 @@ def summarise(run: Run, data: RobotData) -> dict[str, Any]:
     drift = run.drift
     return {
         "scenario": run.scenario["name"],
-        "complete": run.failure is None,
+        "complete": run.complete,
         "failure": run.failure,
+        "stopped": run.stopped,
         "duration": float(run.time[-1]),
         "samples": len(run.time),
         "final": {key: _plain(getattr(run, key)[-1]) for key in _FINAL},
@@ -48,6 +50,8 @@ def summarise(run: Run, data: RobotData) -> dict[str, Any]:
             "potential_final": _plain(run.energy_potential[-1]),
             "work_torque": _plain(run.work_torque[-1]),
             "work_friction": _plain(run.work_friction[-1]),
+            "work_wrench": _plain(run.work_wrench[-1]),
+            "work_contact": _plain(run.work_contact[-1]),
             "drift_final": _plain(drift[-1]),
             "drift_max": _plain(np.abs(drift).max()),
         },
@@ -59,14 +63,28 @@ def summarise(run: Run, data: RobotData) -> dict[str, Any]:
             "qdd_max": _largest(run.qdd),
             "tau_max": _largest(run.tau),
         },
+        "tracking": _tracking(run),
         "events": [event._asdict() for event in run.events],
         "solver": run.statistics._asdict(),
     }
 
 
+def _tracking(run: Run) -> dict[str, Any] | None:
+    """The flange's distance (m) and angle (rad) from its reference."""
+    if run.error is None:
+        return None
+    names = ("position", "angle")
+    largest, final = run.error.max(axis=0), run.error[-1]
+    return {f"{name}_largest": _plain(largest[i]) for i, name in enumerate(names)} | {
+        f"{name}_final": _plain(final[i]) for i, name in enumerate(names)
+    }
+
+
 def warnings(run: Run, data: RobotData) -> list[str]:
     """What a real robot would not have done; one sentence each."""
-    texts = []
+    texts = [] if run.stopped is None else [f"the run ends at {run.time[-1]:.6g} s: {run.stopped}"]
+    way = run.scenario.get("limits", {}).get("joint", "report")
+    note = "; limits are reported, not enforced" if way == "report" else ""
     for joint, low, high, speed, torque in zip(
         data.joints, run.q.min(axis=0), run.q.max(axis=0), _largest(run.qd), _largest(run.tau),
         strict=True,
@@ -77,7 +95,7 @@ def warnings(run: Run, data: RobotData) -> list[str]:
             limit, worst = (joint.lower, low) if kind == "lower" else (joint.upper, high)
             texts.append(
                 f"{joint.name} passes its {kind} limit of {deg(limit):g} deg at {at:.4g} s and "
-                f"reaches {deg(float(worst)):.4g} deg; limits are reported, not enforced"
+                f"reaches {deg(float(worst)):.4g} deg{note}"
             )
         if joint.speed is not None and speed > joint.speed:
             texts.append(
@@ -88,6 +106,11 @@ def warnings(run: Run, data: RobotData) -> list[str]:
             texts.append(
                 f"{joint.name} is driven with {torque:.4g} N m, more than its {joint.torque:g} N m"
             )
+    late = run.scenario.get("reference") and not any(e.kind == ARRIVAL for e in run.events)
+    if late and run.scenario["reference"]["kind"] != "hold" and run.complete:
+        texts.append(
+            "the end of the reference is not reached; make duration_s longer or the motion faster"
+        )
     rated, load = data.ratings.get("payload_kg"), run.scenario.get("payload") or {}
     if rated is not None and load.get("mass", 0.0) > rated:
         texts.append(f"payload {load['mass']:g} kg exceeds the rated {rated:g} kg")

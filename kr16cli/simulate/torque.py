@@ -1,37 +1,22 @@
-"""Joint torques as functions of time and state, and the CSV files that tabulate them."""
+"""Joint torques as functions of time and state."""
 
 from __future__ import annotations
 
-import csv
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from io import StringIO
 from itertools import pairwise
 from pathlib import Path
-from typing import Protocol
 
-from kr16cli.errors import FileError
+from kr16cli.simulate.core import Torque
 from kr16cli.simulate.scenario import TorqueSpec
 from kr16cli.simulate.scenario_check import TORQUE
+from kr16cli.simulate.timed_csv import read_timed_csv
 from kr16cli.single import Arm
 
-_COLUMNS = ("time", *(f"tau{i}" for i in range(1, 7)))
+__all__ = ["Constant", "GravityCompensation", "Table", "Torque", "make_torque", "read_torque_csv"]
 
-
-class Torque(Protocol):
-    """What drives the joints.
-
-    `breaks` are the times (s, rising) at which the torque is not smooth; the solver starts
-    afresh there, so that no step of it spans a kink.
-    """
-
-    @property
-    def breaks(self) -> Sequence[float]:
-        """Times of kinks, s."""
-
-    def __call__(self, t: float, q: Sequence[float], qd: Sequence[float]) -> Sequence[float]:
-        """Six joint torques (N m) at time t (s) in state q (rad), qd (rad/s)."""
+_COLUMNS = tuple(f"tau{i}" for i in range(1, 7))
 
 
 class Constant:
@@ -103,83 +88,11 @@ def make_torque(spec: TorqueSpec, arm: Arm, folder: Path) -> Torque:
 def read_torque_csv(path: str | Path) -> Table:
     """Read torques over time from a CSV file.
 
-    The header names time (s) and tau1 to tau6 (N m); units in brackets and other columns may
-    stand beside them, so a run's own CSV can be read. Comma, tab, or semicolon with decimal
-    comma.
+    The header names time (s) and tau1 to tau6 (N m), see `timed_csv`, so a run's own CSV can
+    be read.
 
     Raises:
         FileError: the file cannot be read, or the line and column that cannot be used.
     """
-    try:
-        text = Path(path).read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise FileError(path, f"not UTF-8 text at byte {error.start}") from None
-    except IsADirectoryError:
-        raise FileError(path, "is a directory; name a CSV file in it") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise FileError(path, f"cannot be read: {reason}") from None
-    head = text.split("\n", 1)[0]
-    delimiter = next((mark for mark in (";", "\t") if mark in head), ",")
-    reader = csv.reader(StringIO(text, newline=""), delimiter=delimiter, skipinitialspace=True)
-    header: list[str] | None = None
-    times: list[float] = []
-    rows: list[list[float]] = []
-    try:
-        for cells in reader:
-            if not any(cell.strip() for cell in cells):
-                continue
-            if header is None:
-                header = [cell.split("[")[0].strip().lower() for cell in cells]
-                _check_header(path, header)
-                continue
-            where = f"line {reader.line_num}"
-            values = _row(path, where, cells, header, decimal_comma=delimiter == ";")
-            if times and values[0] <= times[-1]:
-                raise FileError(path, f"{where}: time {values[0]:g} s does not exceed the one "
-                                f"before, {times[-1]:g} s; times must rise")  # fmt: skip
-            times.append(values[0])
-            rows.append(values[1:])
-    except csv.Error as error:
-        raise FileError(path, f"line {reader.line_num}: no CSV: {error}") from None
-    if not rows:
-        found = "is empty" if header is None else "has a header and no row"
-        raise FileError(path, f"{found}; it needs rows of {','.join(_COLUMNS)}")
-    return Table(times, rows)
-
-
-def _check_header(path: str | Path, header: list[str]) -> None:
-    missing = [name for name in _COLUMNS if name not in header]
-    if missing:
-        raise FileError(
-            path,
-            f"the header lacks {', '.join(missing)}; it must name {','.join(_COLUMNS)}, "
-            f"found: {', '.join(header)[:80]}",
-        )
-    double = next((name for name in _COLUMNS if header.count(name) > 1), None)
-    if double:
-        raise FileError(path, f"the header names {double} twice")
-
-
-def _row(
-    path: str | Path, where: str, cells: list[str], header: list[str], *, decimal_comma: bool
-) -> list[float]:
-    """Time and torques of one row."""
-    if len(cells) != len(header):
-        reason = f"{len(cells)} cells where the header has {len(header)}"
-        raise FileError(path, f"{where}: {reason}")
-    values = []
-    for name in _COLUMNS:
-        cell = cells[header.index(name)].strip()
-        try:
-            value = float(cell.replace(",", ".") if decimal_comma else cell)
-        except ValueError:
-            shown = f"'{cell}'" if cell else "empty"
-            raise FileError(path, f"{where}: {name} is {shown}; it must be a number") from None
-        if not math.isfinite(value):
-            raise FileError(path, f"{where}: {name} is {cell}; every number must be finite")
-        problem = None if name == "time" else TORQUE.problem(value)
-        if problem:
-            raise FileError(path, f"{where}: {name} is {cell}: {problem}")
-        values.append(value)
-    return values
+    table = read_timed_csv(path, {_COLUMNS: TORQUE})
+    return Table(table.times, table.rows)

@@ -1,0 +1,1 @@
+"""Figures and pages. The only part that imports matplotlib."""

@@ -1,0 +1,84 @@
+"""One configuration at a time on the compiled kernels, for the thousands of calls of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kr16cli.api import Robot
+from kr16cli.kernels.engine import engine_name
+from kr16cli.model.view import Axes
+from kr16cli.single import Arm, Matrix
+
+
+class FastArm(Arm):
+    """An `Arm` whose costly answers come from the kernels; the numbers differ by rounding.
+
+    Lists in and out, as controllers and plant expect. Numbers that are not finite raise
+    InputError, a ValueError, where plain floats would give NaN.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        super().__init__(robot.data, payload=robot.payload, drives=robot.drives)
+        self._robot = robot
+
+    def forward_dynamics(
+        self, q: Sequence[float], qd: Sequence[float], tau: Sequence[float]
+    ) -> list[float]:
+        """Joint accelerations, rad/s2."""
+        result = self._robot.forward_dynamics(np.array(q), np.array(qd), np.array(tau))
+        answer: list[float] = result.tolist()
+        return answer
+
+    def inverse_dynamics(
+        self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]
+    ) -> list[float]:
+        """Joint torques, N m."""
+        result = self._robot.inverse_dynamics(np.array(q), np.array(qd), np.array(qdd))
+        answer: list[float] = result.tolist()
+        return answer
+
+    def gravity(self, q: Sequence[float]) -> list[float]:
+        """G(q), N m."""
+        answer: list[float] = self._robot.gravity(np.array(q)).tolist()
+        return answer
+
+    def mass_matrix(self, q: Sequence[float]) -> Matrix:
+        """M(q), kg m2."""
+        rows: Matrix = self._robot.mass_matrix(np.array(q)).tolist()
+        return rows
+
+    def jacobian(
+        self,
+        q: Sequence[float],
+        *,
+        link: int = 6,
+        point: Sequence[float] | None = None,
+        axes: Axes = "robroot",
+    ) -> Matrix:
+        """Geometric Jacobian; see `Arm`."""
+        if link != 6 or point is not None or axes != "robroot":
+            return super().jacobian(q, link=link, point=point, axes=axes)
+        rows: Matrix = self._robot.jacobian(np.array(q)).tolist()
+        return rows
+
+    def jacobian_dot(
+        self,
+        q: Sequence[float],
+        qd: Sequence[float],
+        *,
+        link: int = 6,
+        point: Sequence[float] | None = None,
+        axes: Axes = "robroot",
+    ) -> Matrix:
+        """Rate of the Jacobian; see `Arm`."""
+        if link != 6 or point is not None or axes != "robroot":
+            return super().jacobian_dot(q, qd, link=link, point=point, axes=axes)
+        rows: Matrix = self._robot.jacobian_dot(np.array(q), np.array(qd)).tolist()
+        return rows
+
+
+def quickest_arm(robot: Robot) -> Arm:
+    """The robot's arm on the compiled kernels where they are there, else on plain floats."""
+    return FastArm(robot) if engine_name() == "native" else robot.arm
