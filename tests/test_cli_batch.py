@@ -83,6 +83,9 @@ def test_ik_batch_fits_its_schema_whatever_the_row() -> None:
         "a1;a2;a3;a4;a5;a6\n0;-90;90;0;0;0\n10,0;20;-30;4,0e1;50;60\n",
         "a1\ta2\ta3\ta4\ta5\ta6\n0\t-90\t90\t0\t0\t0\n10\t20\t-30\t40\t50\t60\n",
         f"\ufeff{_GOOD}".replace("\n", "\r\n"),
+        _GOOD.replace("\n", "\n  \n \t\n"),
+        f"   \n{_GOOD}",
+        "a1 [deg],a2 [deg],a3 [deg],a4[deg],a5 [ deg ],a6\n0,-90,90,0,0,0\n10,20,-30,40,50,60\n",
         'a1, "a2", a3, a4, a5, a6\n0, "-90", 90, 0, 0, 0\n\n10, 20, -30, 40, 50, 60',
         '"a1","a2","a3","a4","a5","a6"\n"0","-90","90","0","0","0"\n10,20,-30,40,50,60\n',
     ],
@@ -283,3 +286,140 @@ def test_table_of_a_batch_names_units_and_leaves_missing_cells_empty() -> None:
     assert lines[1].split()[0] == "bad"
     assert "nan" not in done.out
     assert "-0.0" not in done.out
+
+
+def test_tabs_alone_are_a_blank_line_but_commas_alone_are_a_row() -> None:
+    tabs = _GOOD.replace(",", "\t") + "\t\t\t\t\t\n"
+    assert len(kr16("fk", "-", "--json", stdin=tabs).json()["result"]["rows"]) == 2
+    done = kr16("fk", "-", "--json", stdin=f"{_GOOD},,,,,\n")
+    assert [row["status"] for row in done.json()["result"]["rows"]] == ["ok", "ok", "bad"]
+
+
+# Units that a file says ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", ["csv", "npz"])
+@pytest.mark.parametrize("si", [(), ("--si",)])
+def test_joint_angles_of_ik_are_read_in_their_own_units_only(
+    tmp_path: Path, suffix: str, si: tuple[str, ...]
+) -> None:
+    file = tmp_path / f"q.{suffix}"
+    pose = (1.2, 0.1, 0.9, 0, 2, 0) if si else (1200, 100, 900, 0, 120, 0)
+    assert kr16("ik", *pose, *si, "-o", file).code == 0
+    other = () if si else ("--si",)
+    do = "give --si" if si else "leave out --si"
+    complains(kr16("fk", "--input", file, *other, "--json"), str(file), "rad" if si else "deg", do)
+    (row,) = kr16("fk", "--input", file, *si, "--json").json()["result"]["rows"]
+    assert [row["pose"][k] for k in "xyz"] == pytest.approx(pose[:3])
+
+
+def test_poses_of_fk_are_read_in_their_own_units_only(tmp_path: Path) -> None:
+    file = tmp_path / "poses.csv"
+    assert kr16("fk", "-", "--si", "-o", file, stdin=f"{_HEADER}\n0,-1,1,0,0.5,0\n").code == 0
+    complains(kr16("ik", "--input", file, "--json"), str(file), "m rad", "give --si")
+    assert kr16("ik", "--input", file, "--si", "--json").code == 0
+    # Transforms are in m whatever was typed, so npz is read with and without.
+    archive = tmp_path / "poses.npz"
+    assert kr16("fk", 0, -1, 1, 0, 0.5, 0, "--si", "-o", archive).code == 0
+    deg = kr16("ik", "--input", archive, "--json").json()["result"]["rows"][0]["solutions"][0]
+    rad = kr16("ik", "--input", archive, "--si", "--json").json()["result"]["rows"][0]
+    assert np.radians(deg["q"]) == pytest.approx(rad["solutions"][0]["q"])
+
+
+def test_a_run_is_read_in_rad_only(tmp_path: Path) -> None:
+    table, archive = tmp_path / "run.csv", tmp_path / "run.npz"
+    words = "simulate --q 0 -60 60 10 30 20 --duration 0.02"
+    for file in (table, archive):
+        assert kr16(*words.split(), "-o", file).code == 0
+        complains(kr16("dynamics", "--input", file, "--json"), str(file), "rad", "give --si")
+    one = kr16("dynamics", "--input", table, "--si", "--json")
+    two = kr16("dynamics", "--input", archive, "--si", "--json")
+    assert (one.code, one.json()["warnings"]) == (0, [])
+    assert one.json()["result"] == two.json()["result"]
+    first = kr16("dynamics 0 -60 60 10 30 20 --json").result()
+    assert one.json()["result"]["rows"][0]["gravity"] == pytest.approx(first["gravity"])
+    complains(kr16("ik", "--input", table), "give --si")
+
+
+@pytest.mark.parametrize(
+    ("text", "si", "words"),
+    [
+        ("a1,a2,a3,a4,a5,a6,units\n1,2,3,4,5,6,deg\n1,2,3,4,5,6,rad\n", False, ("rad", "give")),
+        ("a1 [rad],a2,a3,a4,a5,a6\n1,2,3,4,5,6\n", False, ("in rad", "give --si")),
+        ("a1,a2,a3,a4,a5,a6 [deg]\n1,2,3,4,5,6\n", True, ("in deg", "leave out --si")),
+        ("a1,a2,a3,a4,a5,a6,qd1 [rad/s],qd2,qd3,qd4,qd5,qd6\n", False, ("rad/s", "give --si")),
+    ],
+)
+def test_units_that_differ_from_those_read_are_refused(
+    text: str, si: bool, words: tuple[str, ...]
+) -> None:
+    complains(kr16("dynamics", "-", "--json", *["--si"] * si, stdin=text), "stdin", *words)
+
+
+def test_a_file_in_mixed_units_must_be_converted() -> None:
+    text = "x,y,z,a,b,c,units\n1,2,3,4,5,6,mm rad\n"
+    for options in ((), ("--si",)):
+        complains(kr16("ik", "-", "--json", *options, stdin=text), "mm rad", "convert it")
+
+
+@pytest.mark.parametrize("units", ["furlongs", "", "[1, 2]", '{"q": "deg"}'])
+def test_units_of_somebody_elses_are_let_be(tmp_path: Path, units: str) -> None:
+    text = f"{_HEADER},units\n1,2,3,4,5,6,{units if units == 'furlongs' else ''}\n"
+    assert kr16("fk", "-", stdin=text).code == 0
+    np.savez(tmp_path / "q.npz", q=np.zeros((1, 6)), units=np.array(units))
+    assert kr16("fk", "--input", tmp_path / "q.npz").code == 0
+    np.savez(tmp_path / "q.npz", q=np.zeros((1, 6)), units=np.array([1.0]))
+    assert kr16("fk", "--input", tmp_path / "q.npz").code == 0
+
+
+# What has no columns ------------------------------------------------------------------------------
+
+_NO_COLUMNS = [
+    ("fk", "--frames all", "--frames all; it is in json and npz"),
+    ("dynamics", "--task", "--task; it is in json and npz"),
+    ("dynamics", "--christoffel", "--christoffel; it is in json and npz"),
+]
+
+
+@pytest.mark.parametrize(("command", "options", "said"), _NO_COLUMNS)
+def test_csv_says_what_it_has_no_columns_for(command: str, options: str, said: str) -> None:
+    text = f"{_HEADER}\n10,-70,80,35,-40,20\n"
+    words = [command, *options.split()]
+    single = kr16(*words, 10, -70, 80, 35, -40, 20, "--format", "csv")
+    assert single.err == f"kr16: warning: csv has no columns for {said}\n"
+    rows = kr16(*words, "-", "--format", "csv", stdin=text)
+    assert rows.err == single.err
+    assert rows.out == single.out
+    assert f"table has no columns for {said}" in kr16(*words, "-", stdin=text).err
+    assert kr16(*words, "-", "--json", stdin=text).json()["warnings"] == []
+    assert kr16(command, "-", "--format", "csv", stdin=text).err == ""
+
+
+def test_npz_holds_what_csv_has_no_columns_for(tmp_path: Path) -> None:
+    file = tmp_path / "out.npz"
+    for command, options, _ in _NO_COLUMNS:
+        done = kr16(command, *options.split(), 10, -70, 80, 35, -40, 20, "-o", file)
+        assert (done.code, done.err) == (0, "")
+        with np.load(file) as archive:
+            wanted = {"fk": "T_frame3", "dynamics": options[2:]}[command]
+            assert any(name.startswith(wanted) for name in archive.files)
+
+
+def test_variants_of_turns_are_in_json_only() -> None:
+    done = kr16("ik 1200 100 900 0 120 0 --turns --format csv")
+    assert done.err == (
+        "kr16: warning: csv has no columns for the variants of --turns; they are in json\n"
+    )
+    assert len(_rows(done.out)) == 1
+
+
+def test_singular_values_and_friction_have_columns() -> None:
+    q = (10, -70, 80, 35, -40, 20)
+    (row,) = _rows(kr16("jacobian", *q, "--format", "csv").out)
+    result = kr16("jacobian", *q, "--json").result()
+    assert [float(row[f"sigma_{i}"]) for i in range(1, 7)] == result["singular_values"]
+    words = ("dynamics", *q, "--drives", "--qd", 10, -20, 30, -40, 50, 60)
+    (row,) = _rows(kr16(*words, "--format", "csv").out)
+    result = kr16(*words, "--json").result()
+    assert [float(row[f"friction_{i}"]) for i in range(1, 7)] == result["friction"]
+    assert "friction_1" not in _rows(kr16("dynamics", *q, "--format", "csv").out)[0]

@@ -7,6 +7,7 @@ import signal
 import stat
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -95,10 +96,43 @@ def test_options_take_six_negative_numbers_anywhere() -> None:
         ("robot", ("kr16 robot needs a command", "check, template")),
         ("fk - --input x.csv", ("-", "--input", "exclude")),
         ("robot check", ("FILE",)),
+        ("robot chek x", ("unknown robot command chek", "did you mean check")),
+        ("export foo", ("unknown export command foo", "known: mjcf, urdf")),
+        (
+            f"fk {_HOME} --tool 1,5 2 3 4 5 6",
+            ("--tool takes 6 numbers (X Y Z A B C), got 7 in '1,5 2 3 4 5 6'", "has a point"),
+        ),
+        (f"fk {_HOME} --tool 1,2,3", ("--tool takes 6 numbers (X Y Z A B C), got 3",)),
+        (f"fk {_HOME} --tool 1,2,3,4,5,x", ("--tool C is 'x'",)),
+        (f"dynamics {_HOME} --payload 1,5 0 0 9", ("4 or 7 numbers (M X Y Z [IX IY IZ]), got 5",)),
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(words: str, expected: tuple[str, ...]) -> None:
     complains(kr16(words), *expected)
+
+
+@pytest.mark.parametrize("option", ["--robot", "--input", "--krl", "--tool", "--output", "-o"])
+def test_an_empty_option_is_not_an_option_left_out(option: str) -> None:
+    """As a shell makes of an unset variable, before and after the numbers."""
+    name = "--output" if option == "-o" else option
+    home = _HOME.split()
+    complains(kr16("fk", *home, option, ""), f"{name} is empty")
+    complains(kr16("fk", option, " ", *home), f"{name} is empty")
+    if option != "-o":
+        complains(kr16("fk", *home, f"{option}="), f"{name} is empty")
+
+
+def test_an_empty_option_of_a_group_is_not_left_out() -> None:
+    complains(kr16("--robot", "", "fk", *_HOME.split()), "--robot is empty", "FILE")
+    complains(kr16("robot", "template", "-o", ""), "--output is empty")
+
+
+def test_a_file_may_have_a_name_that_looks_like_an_option(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert kr16(f"fk {_HOME} --json --output=--").code == 0
+    assert (tmp_path / "--").read_text().startswith("{")
 
 
 def test_no_arguments_prints_help_and_is_a_usage_error() -> None:
@@ -252,7 +286,16 @@ def test_interrupt_is_one_line_and_code_130(monkeypatch: pytest.MonkeyPatch) -> 
     assert done.err == "kr16: interrupted; nothing more was written\n"
 
 
-def test_interrupted_batch_leaves_nothing_behind(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("sent", "code", "said"),
+    [
+        (signal.SIGINT, 130, "kr16: interrupted; nothing more was written\n"),
+        (signal.SIGTERM, 143, "kr16: terminated; nothing more was written\n"),
+    ],
+)
+def test_interrupted_batch_leaves_nothing_behind(
+    tmp_path: Path, sent: signal.Signals, code: int, said: str
+) -> None:
     rows = "0,-90,90,0,10,0\n" * 200_000
     (tmp_path / "q.csv").write_text("a1,a2,a3,a4,a5,a6\n" + rows)
     command = [sys.executable, "-m", "kr16cli", "fk", "--input", "q.csv", "-o", "out.csv"]
@@ -260,11 +303,43 @@ def test_interrupted_batch_leaves_nothing_behind(tmp_path: Path) -> None:
         until = time.monotonic() + 30
         while len(list(tmp_path.iterdir())) < 2 and time.monotonic() < until:
             time.sleep(0.02)  # until the temporary file is there
-        process.send_signal(signal.SIGINT)
+        process.send_signal(sent)
         _, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert err == "kr16: interrupted; nothing more was written\n"
+    assert process.returncode == code
+    assert err == said
     assert [path.name for path in tmp_path.iterdir()] == ["q.csv"]
+
+
+def test_a_callers_own_handling_of_sigterm_is_left_alone() -> None:
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert kr16(f"fk {_HOME}").code == 0
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    seen: list[object] = []
+
+    def theirs(number: int, frame: object) -> None:
+        seen.append(number)
+
+    def killed(_: object) -> int:
+        signal.raise_signal(signal.SIGTERM)
+        return 0
+
+    signal.signal(signal.SIGTERM, theirs)
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(entry, "_run", killed)
+            assert kr16("fk").code == 0
+        assert signal.getsignal(signal.SIGTERM) is theirs
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    assert seen == [signal.SIGTERM]
+
+
+def test_commands_run_in_a_thread_without_signals() -> None:
+    outcomes: list[int] = []
+    thread = threading.Thread(target=lambda: outcomes.append(kr16(f"fk {_HOME}").code))
+    thread.start()
+    thread.join(timeout=60)
+    assert outcomes == [0]
 
 
 def test_a_reader_that_stops_early_is_no_error(tmp_path: Path) -> None:
@@ -378,6 +453,12 @@ def test_template_is_a_sound_file(tmp_path: Path) -> None:
     assert "sound" in done.out
 
 
+def test_check_of_one_problem_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "arm.toml"
+    path.write_text(kr16("robot template").out.replace("mass = 76.0", "mass = -76.0"))
+    complains(kr16(f"robot check {path}"), "mass")
+
+
 def test_check_names_every_broken_rule(tmp_path: Path) -> None:
     path = tmp_path / "arm.toml"
     text = kr16("robot template").out
@@ -385,6 +466,8 @@ def test_check_names_every_broken_rule(tmp_path: Path) -> None:
     done = kr16(f"robot check {path}")
     assert done.code == 2
     assert done.out == ""
-    assert len(done.err.splitlines()) >= 2
-    assert all(line.startswith(f"kr16: error: {path}: ") for line in done.err.splitlines())
+    *lines, last = done.err.splitlines()
+    assert len(lines) == 3
+    assert all(line.startswith(f"kr16: error: {path}: ") for line in lines)
+    assert last == f"kr16: error: {path}: {len(lines)} problems"
     complains(kr16(f"fk {_HOME} --robot {path}"), str(path))

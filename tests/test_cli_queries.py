@@ -449,3 +449,72 @@ def test_task_space_or_the_reason() -> None:
 
 def test_no_inertial_data_no_dynamics() -> None:
     complains(kr16(f"dynamics {_HOME} --robot kr16_l6"), "KR 16 L6", "no inertial data")
+
+
+# numbers beyond what a double holds -------------------------------------------------------------
+
+_LOAD = "--payload 1e308 0 0 1e308"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "dynamics 0 -60 90 0 30 0 --payload 1e300 0 0 100 --tau 1 1 1 1 1 1",
+        f"dynamics 0 -60 90 0 30 0 {_LOAD}",
+        "dynamics 0 -60 90 0 30 0 --qd 1e200 1e200 0 0 0 0",
+        "dynamics 0 -60 90 0 30 0 --gravity 1e308 1e308 1e308",
+        "dynamics 0 -60 90 0 30 0 --tau 1e308 1e308 1e308 1e308 1e308 1e308",
+        "jacobian 0 0 0 0 0 0 --tool 1e200 0 0 0 0 0",
+        "jacobian 0 0 0 0 0 0 --qd 1e308 1e308 1e308 1e308 1e308 1e308 --si --axes flange",
+        "jacobian 0 0 0 0 0 0 --point 1e308 1e308 1e308 --si",
+        "fk 0 -90 90 0 0 0 --tool 1e308 1e308 1e308 45 45 45 "
+        "--base 1.7e308 1.7e308 1.7e308 45 45 45",
+        "fk 0 -90 90 0 0 0 --si --base 1e308 1e308 1e308 0 0 0",
+        f"export urdf {_LOAD}",
+        f"export mjcf {_LOAD}",
+        "export urdf --payload 1 0 0 1e300",
+    ],
+)
+def test_overflow_is_said_in_one_line(command: str) -> None:
+    for form in ("--json", "") if not command.startswith("export") else ("",):
+        done = kr16(f"{command} {form}")
+        complains(done, "large")
+
+
+@given(st.lists(st.sampled_from([0.0, 1.0, 1e-320, -1e150, 1e200, -1e308, 1.7e308]), min_size=25))
+@settings(max_examples=40)
+def test_no_number_is_our_bug(numbers: list[float]) -> None:
+    q, six, more, (mass, *centre) = numbers[:6], numbers[6:12], numbers[12:18], numbers[18:22]
+    for words in (
+        ["fk", *q, "--tool", *six, "--base", *more],
+        ["ik", *q, "--tool", *six, "--near", *more],
+        ["jacobian", *q, "--tool", *six, "--qd", *more],
+        ["dynamics", *q, "--qd", *six, "--tau", *more, "--payload", abs(mass), *centre, "--task"],
+        ["export", "urdf", "--payload", abs(mass), *centre],
+    ):
+        done = kr16(*words, *["--json"] * (words[0] != "export"))
+        assert done.code in (0, 2, 3), done.err
+        assert not re.search(r"\b(inf|nan)\b", done.out, re.IGNORECASE)
+
+
+def test_arithmetic_that_fails_on_ordinary_numbers_is_our_bug(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def divide(arm: Arm, q: list[float]) -> float:
+        return 1.0 / 0.0
+
+    monkeypatch.setattr(Arm, "determinant", divide)
+    complains(kr16(f"jacobian {_HOME}"), "our bug", "ZeroDivisionError", code=70)
+    complains(kr16("jacobian 1e40 0 0 0 0 0"), "large")
+
+
+def test_help_says_how_coulomb_friction_is_regularised(data: RobotData) -> None:
+    text = " ".join(kr16("dynamics --help").out.split())
+    assert "qd/sqrt(qd^2 + 0.01^2)" in text
+    (percent,) = map(float, re.findall(r"within ([0-9.]+) % of its value at 20 deg/s", text))
+    qd = units.rad(20.0)
+    torque = Arm(data, drives=True).friction([qd] * 6)
+    for joint, value in zip(data.joints, torque, strict=True):
+        coulomb = joint.coulomb or 0.0
+        lost = 1 - (value - (joint.viscous or 0.0) * qd) / coulomb
+        assert round(100 * lost, 2) == percent

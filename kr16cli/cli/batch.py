@@ -35,7 +35,7 @@ def answer_rows(
 
     Nothing is written before the last row is done, so an interrupted batch leaves no half.
     """
-    batch = rows.read(source, question.reads, question.optional)
+    batch = rows.read(source, question.reads, question.optional, si=common.si)
     sink = _sink(question, data, common.kind)
     warnings = _Gathered()
     problems: list[str] = []
@@ -55,6 +55,8 @@ def answer_rows(
         more = f" ({bad} such rows)" if bad > 1 else ""
         raise InputError(f"{batch.name}, {problems[0]}{more}; --strict: nothing is written")
     texts = [*batch.warnings, *warnings.texts()]
+    if common.kind in ("csv", "table"):
+        texts += unlisted(question, common.kind)
     inputs = {"source": batch.name, "rows": count, **question.options}
     target.write(sink.content(inputs, texts))
     if common.kind != "json":
@@ -71,6 +73,14 @@ def one_row(question: Question, data: RobotData, kind: str, answer: Answer) -> s
     sink = _sink(question, data, kind)
     sink.add(answer, answer.status, answer.problem)
     return sink.content({}, [])
+
+
+def unlisted(question: Question, kind: str) -> list[str]:
+    """A warning for each thing asked for that has no columns."""
+    return [
+        f"{kind} has no columns for {what}; {where}"
+        for what, where in question.beyond_columns.items()
+    ]
 
 
 def warn(texts: Sequence[str], kind: str = "warning: ") -> None:

@@ -47,10 +47,14 @@ def unknown(kind: str, word: str, known: list[str]) -> InputError:
 class _AsTyped:
     """Stands in for typer's pydantic coercion where a value is text: nothing to coerce.
 
-    Importing pydantic costs more than everything else a single query does.
+    Importing pydantic costs more than everything else a single query does. An option with an
+    empty text, as a shell makes of an unset variable, is no option left out: InputError.
     """
 
     def coerce(self, value: Any, param: Any, ctx: Any) -> Any:
+        option = param.param_type_name == "option" and not ctx.resilient_parsing
+        if option and isinstance(value, str) and not value.strip():
+            raise InputError(f"{param.opts[0]} is empty; it needs {param.metavar or 'a value'}")
         return () if value is None and (param.multiple or param.nargs == -1) else value
 
 
@@ -86,7 +90,15 @@ class _Lean:
 
 
 class LeanGroup(_Lean, TyperGroup):
-    """A group of commands without costly start-up."""
+    """A group of commands without costly start-up, which names its commands to the mistyped."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that the first word names."""
+        word = args[0]
+        known = ctx.resilient_parsing or self.get_command(ctx, word) is not None
+        if not known and not word.startswith("-"):
+            raise unknown(f"{ctx.info_name} command", word, self.list_commands(ctx))
+        return super().resolve_command(ctx, args)
 
 
 class Command(_Lean, TyperCommand):
@@ -133,7 +145,7 @@ class _Sorter:
                 continue
             if not joined:
                 value = self.value(name, param, rest, len(others))
-            options.append(f"{name}={value}" if name.startswith("--") else f"{name}{value}")
+            options += [name, value]
         return [*options, "--", *others]
 
     @staticmethod
@@ -153,11 +165,13 @@ class _Sorter:
     def value(self, name: str, param: Any, rest: list[str], before: int) -> str:
         """Take the option's value from the words that follow it."""
         words = (param.metavar or "").split()
+        least = next((i for i, w in enumerate(words) if w.startswith("[")), len(words))
         if not rest or self.is_option(rest[0]):
             raise InputError(f"{name} needs {param.metavar or 'a value'}")
         if len(words) < 2 or not is_number(rest[0]):
+            if len(words) > 1:
+                self.decimal_commas(name, param.metavar, rest, (least, len(words)))
             return rest.pop(0)
-        least = next((i for i, w in enumerate(words) if w.startswith("[")), len(words))
         run = next((i for i, w in enumerate(rest) if not is_number(w)), len(rest))
         # An optional tail is there if the numbers that would be left over make sense without it:
         # none at all, or the six of the command itself.
@@ -168,3 +182,17 @@ class _Sorter:
             raise InputError(f"{name} takes {what} numbers ({param.metavar}), got {run}")
         taken, rest[:] = rest[:takes], rest[takes:]
         return " ".join(taken)
+
+    @staticmethod
+    def decimal_commas(name: str, metavar: str, rest: list[str], takes: tuple[int, int]) -> None:
+        """InputError for words like `1,5 2 3`, which are too few or too many numbers."""
+        parts = [word.split(",") for word in rest[: takes[1]]]
+        run = next((i for i, p in enumerate(parts) if not all(map(is_number, p))), len(parts))
+        count, shown = sum(map(len, parts[:run])), " ".join(rest[:run])
+        if run < 2 or len(parts[0]) in takes or count in takes:
+            return
+        what = " or ".join(map(str, dict.fromkeys(takes)))
+        raise InputError(
+            f"{name} takes {what} numbers ({metavar}), got {count} in '{shown}'; a comma parts "
+            "numbers, a decimal has a point"
+        )

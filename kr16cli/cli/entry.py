@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from kr16cli.errors import Kr16Error
 
 _OUR_BUG = 70
 _INTERRUPTED = 130
+_TERMINATED = 143
 _USAGE = 2
+
+
+class _TerminatedError(SystemExit):
+    """SIGTERM arrived: files that are half written go the way they go after an error.
+
+    A SystemExit, so that a worker process that gets the signal ends in silence.
+    """
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -21,7 +31,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns:
         The exit code: 0 done, 1 it ran and the answer is no, 2 usage or input or output,
-        3 no physical answer, 4 an optional part is missing, 70 our bug, 130 interrupted.
+        3 no physical answer, 4 an optional part is missing, 70 our bug, 130 interrupted,
+        143 terminated.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     debug = bool(os.environ.get("KR16_DEBUG"))
@@ -31,7 +42,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="backslashreplace")  # a name may not fit the terminal
     try:
-        code = _run(arguments)
+        with _termination():
+            code = _run(arguments)
         if sys.stdout is not None:
             sys.stdout.flush()
     except BrokenPipeError:
@@ -39,6 +51,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     except KeyboardInterrupt:
         return _complain("interrupted; nothing more was written", _INTERRUPTED)
+    except _TerminatedError:
+        return _complain("terminated; nothing more was written", _TERMINATED)
     except Exception as error:
         if debug:
             raise
@@ -46,6 +60,27 @@ def main(argv: Sequence[str] | None = None) -> int:
             _drop_stdout()
         return _complain(*_explained(error))
     return code
+
+
+@contextmanager
+def _termination() -> Iterator[None]:
+    """Turns SIGTERM into an exception, unless the caller has a handler of its own."""
+    # Signals can be handled in the main thread alone; elsewhere the caller deals with them.
+    ours = signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    if ours:
+        try:
+            signal.signal(signal.SIGTERM, _terminate)
+        except ValueError:
+            ours = False
+    try:
+        yield
+    finally:
+        if ours:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def _terminate(number: int, frame: object) -> None:
+    raise _TerminatedError(_TERMINATED)
 
 
 def _explained(error: Exception) -> tuple[str, int]:
@@ -87,7 +122,7 @@ def _run(arguments: list[str]) -> int:
 def _complain(text: str, code: int) -> int:
     """One line on stderr."""
     if sys.stderr is not None:
-        prefix = "kr16: " if code == _INTERRUPTED else "kr16: error: "
+        prefix = "kr16: " if code in (_INTERRUPTED, _TERMINATED) else "kr16: error: "
         print(prefix + " ".join(text.split()), file=sys.stderr)
     return code
 

@@ -10,6 +10,8 @@ from typing import Annotated
 
 import typer
 
+from kr16cli.tolerances import TOLERANCES
+
 _SIX_MM = "Six numbers, mm and degrees, or KRL text {X ..,Y ..,Z ..,A ..,B ..,C ..}."
 
 Joints = Annotated[
@@ -88,7 +90,13 @@ LoadData = Annotated[
     typer.Option("--load-data", metavar="TEXT", help="The payload as KUKA LOAD_DATA text."),
 ]
 Drives = Annotated[
-    bool, typer.Option("--drives", help="Count rotor inertia and friction of the data file.")
+    bool,
+    typer.Option(
+        "--drives",
+        help="Count rotor inertia and friction of the data file. Coulomb friction is regularised "
+        f"as qd/sqrt(qd^2 + {TOLERANCES.coulomb_speed:g}^2), qd in rad/s: within 0.04 % of its "
+        "value at 20 deg/s.",
+    ),
 ]
 Frames = Annotated[
     str | None,

@@ -46,13 +46,11 @@ class Target:
     """
 
     def __init__(self, output: str | None) -> None:
-        self._path = None if output in (None, "-") else Path(str(output) or "--").expanduser()
+        self._path = None if output in (None, "-") else Path(str(output)).expanduser()
         self._temporary: Path | None = None
 
     def __enter__(self) -> Target:
         if self._path is not None:
-            if not str(self._path).strip() or str(self._path) == "--":
-                raise InputError("-o needs the name of a file, or - for stdout")
             with _as_file_error(self._path):
                 self._path = self._path.resolve()
                 if self._path.is_dir():

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,6 +25,11 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
 
 # Columns that this program writes itself are passed over in silence.
 _OWN = {"status", "reason", "units", "s", "t", "solutions", "residual", *sum(GROUPS.values(), ())}
+_OWN |= {"time", *(f"energy_{kind}" for kind in ("kinetic", "potential"))}
+_OWN |= {f"work_{what}" for what in ("torque", "friction", "wrench", "contact")}
+
+# Words that say in which units a group's numbers are; torques are N m in any case.
+_SI_WORDS, _EDGE_WORDS = {"rad", "m"}, {"deg", "mm"}
 
 
 class Row(NamedTuple):
@@ -43,16 +51,18 @@ class Batch(NamedTuple):
     warnings: list[str]
 
 
-def read(source: str, needed: str, optional: Sequence[str] = ()) -> Batch:
+def read(source: str, needed: str, optional: Sequence[str] = (), *, si: bool = False) -> Batch:
     """Read a batch.
 
     Args:
         source: path of a CSV or npz file; "-" for stdin.
         needed: group every row must have, "q" or "pose".
         optional: groups taken where the file has them.
+        si: numbers are taken as rad and m, else as degrees and mm.
 
     Raises:
-        FileError: the file cannot be read or has no usable header.
+        FileError: the file cannot be read, has no usable header, or says that its numbers are
+            in other units; of a row's units only when the row is taken.
     """
     name = "stdin" if source == "-" else source
     try:
@@ -63,11 +73,26 @@ def read(source: str, needed: str, optional: Sequence[str] = ()) -> Batch:
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(name, f"cannot be read: {reason}") from None
     if content.startswith(_NPZ_MAGIC):
-        return _npz_batch(content, name, needed, optional)
-    return _csv_batch(content, name, needed, optional)
+        return _npz_batch(content, name, needed, optional, si=si)
+    return _csv_batch(content, name, needed, optional, si=si)
 
 
-def _csv_batch(content: bytes, name: str, needed: str, optional: Sequence[str]) -> Batch:
+def _check_units(name: str, unit: str, group: str, *, si: bool) -> None:
+    """FileError where a file says that a group's numbers are in other units than are read."""
+    said = set(re.findall("[a-z]+", unit.lower()))
+    if group != "pose":
+        said &= {"rad", "deg"}
+    if group == "tau" or not said & (_EDGE_WORDS if si else _SI_WORDS):
+        return
+    mixed = said & (_SI_WORDS if si else _EDGE_WORDS)
+    do = "convert it" if mixed else "leave out --si" if si else "give --si"
+    reads = "rad and m" if si else "degrees and mm"
+    raise FileError(name, f"its numbers are in {unit}, but {reads} are read; {do}")
+
+
+def _csv_batch(
+    content: bytes, name: str, needed: str, optional: Sequence[str], *, si: bool
+) -> Batch:
     import csv
 
     try:
@@ -81,8 +106,13 @@ def _csv_batch(content: bytes, name: str, needed: str, optional: Sequence[str]) 
     lines = _lines(
         csv.reader(StringIO(text, newline=""), delimiter=delimiter, skipinitialspace=True), name
     )
-    header = [cell.strip().lower() for cell in next(lines)]
+    header, column_units = _header(next(lines))
     taken = _columns(header, name, needed, optional)
+    for group, columns in taken.items():
+        for column in columns:
+            _check_units(name, column_units[column], group, si=si)
+    if "units" in header:
+        lines = _in_units(lines, header.index("units"), name, needed, si=si)
     extra = [cell for cell in header if cell and cell not in _OWN]
     warnings = [f"{name}: columns not used: {', '.join(extra)}"] if extra else []
     comma = delimiter != ","
@@ -91,13 +121,38 @@ def _csv_batch(content: bytes, name: str, needed: str, optional: Sequence[str]) 
 
 
 def _lines(reader: Any, name: str) -> Iterator[list[str]]:
-    """Lines of a CSV file that are not blank; FileError where it is none."""
+    """Lines of a CSV file that hold more than blanks; FileError where it is none."""
     import csv
 
     try:
-        yield from (line for line in reader if line)
+        for line in reader:
+            blank = len(line) < 2 or reader.dialect.delimiter == "\t"
+            if not blank or "".join(line).strip():
+                yield line
     except csv.Error as error:
         raise FileError(name, f"line {reader.line_num}: no CSV: {error}") from None
+
+
+def _header(cells: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Names and units of the columns, `q1 [rad]`; a simulation calls the joint angles q1 to q6."""
+    parts = [cell.strip().lower().partition("[") for cell in cells]
+    names = [name.strip() for name, _, _ in parts]
+    if not set(GROUPS["q"]) & set(names):
+        names = [re.sub("^q([1-6])$", r"a\1", name) for name in names]
+    return names, [unit.rstrip("] ") for _, _, unit in parts]
+
+
+def _in_units(
+    lines: Iterator[list[str]], at: int, name: str, needed: str, *, si: bool
+) -> Iterator[list[str]]:
+    """The lines, once what each says in its column `units` is found to be what is read."""
+    sound = {""}
+    for cells in lines:
+        unit = cells[at] if at < len(cells) else ""
+        if unit not in sound:
+            _check_units(name, unit, needed, si=si)
+            sound.add(unit)
+        yield cells
 
 
 def _columns(
@@ -145,7 +200,9 @@ def _csv_row(
         return Row({}, str(error))
 
 
-def _npz_batch(content: bytes, name: str, needed: str, optional: Sequence[str]) -> Batch:
+def _npz_batch(
+    content: bytes, name: str, needed: str, optional: Sequence[str], *, si: bool
+) -> Batch:
     import numpy as np
 
     keys = {"q": "q", "pose": "T"}
@@ -158,10 +215,14 @@ def _npz_batch(content: bytes, name: str, needed: str, optional: Sequence[str]) 
                 if keys.get(group, group) in archive
             }
             found = ", ".join(archive.files)
+            units = _npz_units(archive)
     except Exception as error:
         raise FileError(name, f"no readable npz: {' '.join(str(error).split())}") from None
     if needed not in arrays:
         raise FileError(name, f"lacks the array {keys[needed]}; found: {found}")
+    for group in arrays:
+        if group != "pose":  # the 4x4 transforms are in m, whatever is typed
+            _check_units(name, units.get(group, ""), group, si=si)
     for group, array in arrays.items():
         if array.dtype.kind not in "fiu":
             key = keys.get(group, group)
@@ -178,6 +239,19 @@ def _npz_batch(content: bytes, name: str, needed: str, optional: Sequence[str]) 
         if len(array) != count:
             raise FileError(name, f"{group} has {len(array)} rows, {needed} has {count}")
     return Batch(name, _array_rows(arrays, count, needed), count, [])
+
+
+def _npz_units(archive: Mapping[str, Any]) -> dict[str, str]:
+    """The units that this program writes into its npz files, by array; empty without."""
+    found: dict[str, str] = {}
+    for key in ("units", "metadata"):
+        if key not in archive or archive[key].dtype.kind != "U":
+            continue
+        with suppress(ValueError, AttributeError):  # no JSON, or no object: somebody else's
+            about = json.loads(str(archive[key]))
+            about = about["units"] if key == "metadata" and "units" in about else about
+            found |= {name: str(unit) for name, unit in about.items()}
+    return found
 
 
 def _array_rows(arrays: Mapping[str, Any], count: int, needed: str) -> Iterator[Row]:

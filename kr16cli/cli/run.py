@@ -48,12 +48,12 @@ def ask(
         return 2
     data = load(ctx)
     question = make(data)
-    if common.source:
+    if common.source is not None:
         with output.Target(common.output) as target:
             return batch.answer_rows(question, data, common, common.source, target)
     if common.track:
         raise InputError("--track works on the rows of --input; a single query has no row before")
-    value = question.read_krl(krl) if krl else _typed(question, words)
+    value = question.read_krl(krl) if krl is not None else _typed(question, words)
     with output.Target(common.output) as target:
         return _single(question, data, common, value, target, tabulate)
 
@@ -97,6 +97,8 @@ def _single(
         target.write(batch.one_row(question, data, common.kind, answer))
     if common.kind != "json":
         batch.warn(answer.warnings)
+    if common.kind == "csv":
+        batch.warn(batch.unlisted(question, "csv"))
     if answer.problem:
         batch.warn([answer.problem], "")
         return 3

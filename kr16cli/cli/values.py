@@ -27,17 +27,23 @@ def number(text: str, name: str) -> float:
     return value + 0.0  # a typed -0 is 0
 
 
-def numbers(words: Sequence[str], names: Sequence[str], what: str) -> list[float]:
-    """As many finite numbers as there are names; words may hold several, `1,2,3`."""
+def numbers(
+    words: Sequence[str], names: Sequence[str], what: str, *, of_option: bool = False
+) -> list[float]:
+    """As many finite numbers as there are names; words may hold several, `1,2,3`.
+
+    A complaint about one of an option's numbers names the option too.
+    """
     parts = [part for word in words for part in word.replace(",", " ").replace(";", " ").split()]
     if len(parts) != len(names):
         raise InputError(f"{what} takes {len(names)} numbers ({' '.join(names)}), got {len(parts)}")
-    return [number(part, name) for part, name in zip(parts, names, strict=True)]
+    before = f"{what} " if of_option else ""
+    return [number(part, before + name) for part, name in zip(parts, names, strict=True)]
 
 
 def option(text: str | None, names: Sequence[str], what: str) -> list[float] | None:
     """The numbers of an option, or None where it was not given."""
-    return None if text is None else numbers([text], [f"{what} {n}" for n in names], what)
+    return None if text is None else numbers([text], names, what, of_option=True)
 
 
 def six(text: str | None, what: str) -> list[float] | None:
@@ -84,7 +90,7 @@ def payload(text: str | None, load_data: str | None, *, si: bool) -> Payload | N
     words = text.replace(",", " ").split()
     if len(words) not in (4, 7):
         raise InputError(f"--payload takes 4 or 7 numbers ({' '.join(names)}), got {len(words)}")
-    values = numbers(words, [f"--payload {n}" for n in names[: len(words)]], "--payload")
+    values = numbers(words, names[: len(words)], "--payload", of_option=True)
     return kuka.payload_from_numbers(values, si=si)
 
 

@@ -7,6 +7,7 @@ file's "zero-pose" frames have them: link 1 at (0, 0, d1), links 2 and 3 on thei
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast
@@ -58,7 +59,8 @@ def tree(data: RobotData, payload: Payload | None = None) -> Tree:
     """The robot as a tree; the payload joins link 6.
 
     Raises:
-        InputError: a payload for a robot whose link masses are not known.
+        InputError: a payload for a robot whose link masses are not known, or one too large
+            for the numbers of link 6 to be finite.
     """
     if payload is not None and payload.mass and not data.links:
         raise InputError(
@@ -78,7 +80,13 @@ def tree(data: RobotData, payload: Payload | None = None) -> Tree:
         if payload is not None and payload.mass:
             load = body_about(payload.mass, payload.com, payload.inertia)
             axes = Frame(flange.x, flange.y, flange.z, (0.0, 0.0, 0.0))
-            inertials[5] = _inertial(bodies[5] + moved(load, axes, sub(flange.p, turning[5].p)))
+            last = _inertial(bodies[5] + moved(load, axes, sub(flange.p, turning[5].p)))
+            if not all(map(math.isfinite, (last.mass, *last.com, *last.inertia))):
+                raise InputError(
+                    "the payload's numbers are so large that the inertia of link 6 with it "
+                    "overflows (1.8e308); give smaller ones"
+                )
+            inertials[5] = last
     segments = (
         Segment(f"link_{i}", joint, origin, _vector(frame.z), inertial)
         for i, joint, origin, frame, inertial in zip(

@@ -8,13 +8,16 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 from kr16cli import kuka, units
-from kr16cli.errors import InputError
+from kr16cli.errors import InputError, Kr16Error
 from kr16cli.krl import parse_krl
 from kr16cli.model.task import product
 from kr16cli.robot import RobotData
 from kr16cli.tolerances import TOLERANCES
 
 Matrix = list[list[float]]
+
+# Beyond this nothing is a length, speed or mass, and what fails to be computed is no bug.
+_HUGE = 1e30
 
 
 class Answer(NamedTuple):
@@ -40,6 +43,15 @@ def _all_finite(value: Any) -> bool:
     if isinstance(value, (list, tuple)):
         return all(map(_all_finite, value))
     return True
+
+
+def _is_huge(value: Any) -> bool:
+    """Whether a number is so large that its powers may overflow."""
+    if isinstance(value, (float, int)):
+        return abs(value) > _HUGE
+    if isinstance(value, Mapping):
+        return any(map(_is_huge, value.values()))
+    return isinstance(value, (list, tuple)) and any(map(_is_huge, value))
 
 
 class Question(ABC):
@@ -69,7 +81,11 @@ class Question(ABC):
         """The answer; InputError where its numbers exceed what a double can hold."""
         try:
             answer = self.answer(values)
-        except OverflowError:
+        except Kr16Error:
+            raise
+        except (ArithmeticError, ValueError):  # inf - inf in a sum, a number lost beside another
+            if not _is_huge((values, self.options)):
+                raise
             answer = None
         if answer is None or not _all_finite(answer.result):
             raise InputError(
@@ -77,6 +93,11 @@ class Question(ABC):
                 "(1.8e308); give smaller ones"
             )
         return answer
+
+    @property
+    def beyond_columns(self) -> dict[str, str]:
+        """What was asked for that a CSV row has no columns for, and where it is."""
+        return {}
 
     @abstractmethod
     def columns(self, result: Mapping[str, Any] | None) -> dict[str, Any]:

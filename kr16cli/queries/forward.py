@@ -73,7 +73,7 @@ class ForwardQuestion(Question):
             "in": self.seen_from,
             "pose": dict(zip(_POSE, [*numbers, s, t], strict=True)),
             "matrix": T,
-            "krl": kuka.format_e6pos(kuka.pose_from_matrix(T), s, t),
+            "krl": kuka.format_e6pos(plain(kuka.pose_from_matrix(T)), s, t),
         }
         if self.frames is not None:
             result |= self._frames(q, cs or FLOATS.trig(q))
@@ -111,6 +111,11 @@ class ForwardQuestion(Question):
             for axis, value in zip("xyz", point, strict=True)
         }
         return {**result["pose"], **extra}
+
+    @property
+    def beyond_columns(self) -> dict[str, str]:
+        """The frames, 16 numbers each, with wrist centre and R36."""
+        return {} if self.frames is None else {f"--frames {self.frames}": "it is in json and npz"}
 
     def arrays(self, result: Mapping[str, Any]) -> dict[str, Any]:
         """T (m), pose, s, t; frames and mass centres where asked for."""

@@ -253,6 +253,11 @@ class InverseQuestion(Question):
             "residual": best["residual"],
         }
 
+    @property
+    def beyond_columns(self) -> dict[str, str]:
+        """All solutions but one."""
+        return {"the variants of --turns": "they are in json"} if self.turns else {}
+
     def arrays(self, result: Mapping[str, Any]) -> dict[str, Any]:
         """q of the best solution; Q by branch (NaN where missing); s, t, residual."""
         by_branch = [[math.nan] * 6 for _ in range(8)]

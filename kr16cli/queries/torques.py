@@ -135,10 +135,15 @@ class DynamicsQuestion(Question):
         return "kg m s rad"
 
     def columns(self, result: Mapping[str, Any] | None) -> dict[str, Any]:
-        """gravity_1.., torque_1.., acceleration_1.., energies, base_wrench_1.., m_11.., c_11.."""
+        """gravity_1.., energies, base_wrench_1.., m_11.., c_11...
+
+        Where asked for friction_1.., torque_1.., acceleration_1.. after gravity.
+        """
         r = result or {}
         six, square = [None] * 6, [[None] * 6 for _ in range(6)]
         row = flat("gravity", r.get("gravity", six))
+        if self.drives:
+            row |= flat("friction", r.get("friction", six))
         for name, asked in (("torque", "qdd"), ("acceleration", "tau")):
             if name in r or self.typed[asked] is not None:
                 row |= flat(name, r.get(name, six))
@@ -147,6 +152,12 @@ class DynamicsQuestion(Question):
         row |= flat("base_wrench", r.get("base_wrench", six))
         row |= flat("m", r.get("mass_matrix", square))
         return row | flat("c", r.get("coriolis_matrix", square))
+
+    @property
+    def beyond_columns(self) -> dict[str, str]:
+        """The matrices of the task space and C_k."""
+        asked = {"--task": self.task, "--christoffel": self.christoffel}
+        return {name: "it is in json and npz" for name, wanted in asked.items() if wanted}
 
     def arrays(self, result: Mapping[str, Any]) -> dict[str, Any]:
         """The vectors and matrices by name, and the two energies."""

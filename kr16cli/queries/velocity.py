@@ -174,12 +174,13 @@ class JacobianQuestion(Question):
         return {**result, "rate_matrix_inverse": plain(orientation.inverse_rate_matrix(cs))}
 
     def columns(self, result: Mapping[str, Any] | None) -> dict[str, Any]:
-        """j_11..j_66, determinant, condition, manipulability, jd_11..jd_66 with qd."""
+        """j_11..j_66, determinant to manipulability, sigma_1..sigma_6, jd_11..jd_66 with qd."""
         empty = [[None] * 6 for _ in range(6)]
         r = result or {}
         row = {
             **flat("j", r.get("jacobian", empty)),
             **{key: r.get(key) for key in ("determinant", "condition", "manipulability")},
+            **flat("sigma", r.get("singular_values", [None] * 6)),
         }
         if "jacobian_dot" in r or self.qd is not None:
             row |= flat("jd", r.get("jacobian_dot", empty))

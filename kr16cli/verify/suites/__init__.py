@@ -1,0 +1,1 @@
+"""The registered cases, one module or package per suite."""

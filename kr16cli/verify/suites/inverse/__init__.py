@@ -1,0 +1,5 @@
+"""Suite `inverse`: inverse kinematics: closure, completeness, branches, singular cases."""
+
+from kr16cli.verify.suites.inverse import closure, completeness, singular
+
+__all__ = ["closure", "completeness", "singular"]
