@@ -120,15 +120,15 @@ def branches(setting: Setting) -> Drawing:
     robot = setting.robot
     T = robot.fk(np.radians(SHOWN_DEG))
     q = robot.ik(T)
-    found = np.isfinite(q).all(axis=1)
-    shown = np.where(found[:, None], q, 0.0)
+    found = np.asarray(np.isfinite(q).all(axis=1))
+    shown = np.where(found.reshape(-1, 1), q, 0.0)
     lower, upper = (
         np.array([getattr(j, s) for j in robot.data.joints]) for s in ("lower", "upper")
     )
     status, turn = robot.status_turn(shown)
     a5 = robot.jacobian(shown)[:, 3:, 4]
     points = skeleton(robot, shown)
-    outside = (shown < lower) | (shown > upper)
+    outside = np.logical_or(shown < lower, shown > upper)
     return {
         "pose_mm_deg": kuka.pose_from_matrix(T.tolist()),
         "found": found,
@@ -137,7 +137,7 @@ def branches(setting: Setting) -> Drawing:
         "a5_ends": oblique(np.stack([points[:, 5], points[:, 5] + 0.28 * a5], axis=1)),
         "status": status,
         "turn": turn,
-        "outside": [[f"A{i + 1}" for i in np.flatnonzero(row)] for row in outside],
+        "outside": [[f"A{i + 1}" for i in range(6) if row[i]] for row in outside.tolist()],
         "floor": oblique(_circle(0.28)),
     }
 

@@ -17,6 +17,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, SourceFileLoader
 from pathlib import Path
@@ -24,6 +25,7 @@ from types import CodeType, ModuleType
 from typing import Any
 
 from kr16cli import robot_file
+from kr16cli.robot import RobotData
 from kr16cli.verify import exact, registry, sampling
 from kr16cli.verify.independent import exponentials, lagrange, roots
 from kr16cli.verify.mutants import function_at
@@ -155,12 +157,16 @@ def _watched(case: Case, job: Mapping[str, Any], called: set[str]) -> dict[str, 
     }
 
 
+@cache
+def _shipped() -> RobotData:
+    return robot_file.load_data()
+
+
 def _setting(job: Mapping[str, Any]) -> Setting:
     from kr16cli.api import Robot
 
     table = job.get("table")
-    path = f"{robot_file.DEFAULT}.toml"
-    data = robot_file.parse_data(table, path) if table else robot_file.load_data()
+    data = robot_file.parse_data(table, f"{robot_file.DEFAULT}.toml") if table else _shipped()
     return Setting(Robot(data), job["seed"], quick=True)
 
 
@@ -204,6 +210,7 @@ def main() -> None:
     """Answer jobs until stdin ends."""
     for name in _LIBRARIES:
         importlib.import_module(name)
+    _shipped()
     gc.freeze()  # forks then share what is loaded
     out = os.dup(1)  # what the model prints must not end up among the answers
     os.dup2(2, 1)

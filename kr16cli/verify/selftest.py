@@ -24,7 +24,7 @@ from types import TracebackType
 from typing import Any
 
 import kr16cli
-from kr16cli.errors import Kr16Error
+from kr16cli.errors import CheckFailedError, Kr16Error
 from kr16cli.verify import mutants
 from kr16cli.verify.mutants import Mutant
 from kr16cli.verify.registry import SUITES
@@ -108,7 +108,7 @@ def run(seeded: Sequence[Mutant], seed: int, workers: int | None = None) -> Iter
         workers: processes at a time; by default one for each core.
 
     Raises:
-        Kr16Error: a case fails on the model as it is; a self-test would prove nothing.
+        CheckFailedError: a case fails on the model as it is; a self-test would prove nothing.
     """
     count = max(1, min(workers or _cores(), len(seeded)))
     pool: SimpleQueue[_Worker] = SimpleQueue()
@@ -120,7 +120,7 @@ def run(seeded: Sequence[Mutant], seed: int, workers: int | None = None) -> Iter
                                 "limit": 10 * _LIMIT})["cases"]  # fmt: skip
         broken = [c["id"] for c in cases if c["status"] == "failed"]
         if broken:
-            raise Kr16Error(
+            raise CheckFailedError(
                 f"{len(broken)} cases fail on the model as it is ({broken[0]}); "
                 "run kr16 verify --quick and mend these first"
             )

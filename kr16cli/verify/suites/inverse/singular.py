@@ -153,13 +153,13 @@ def elbow(setting: Setting) -> Finding:
     "inverse.singular-fold",
     title="An arm folded onto its own shoulder: A2 keeps its known value",
     statement="Where a2 = hypot(a3, d4) and the wrist centre is on the A2 axis, q2 = near q2; "
-    "within 1e-12 .. 1e-9 m of it, and 1e-3 m off, every solution reproduces the pose",
-    regime="lengths 0.85, 0.40, 0.75 m; on the fold, within 1e-9 m of it, and 1e-3 m off",
+    "1e-3 m, 3e-5 m, and up to 1e-10 m off it, every solution reproduces the pose",
+    regime="lengths 0.85, 0.40, 0.75 m; on the fold, and 1e-3, 3e-5, 1e-10, 1e-12 m off",
     method="rule of section 3.2.3; residuals by the product of exponentials",
     grade="B",
-    tolerance=2e-9,
+    tolerance=5e-8,
     unit="rad, m",
-    reason="within 1e-9 m counts as folded and moves the pose by that",
+    reason="within 1e-9 m counts as folded; 3e-5 m off, cosines near -1 cost half their digits",
     functions=_IK,
 )
 def fold(setting: Setting) -> Finding:
@@ -170,7 +170,7 @@ def fold(setting: Setting) -> Finding:
     n = setting.samples(2000, 100)
     folded = sampling.straight(g) + math.pi
     q = sampling.with_joint(sampling.generic(rng, 2 * n), 3, sampling.turned(np.array(folded)))
-    off = np.where(rng.random(n) < 0.5, 1e-3, 10.0 ** -rng.uniform(9.1, 12.0, n))
+    off = rng.choice([1e-3, 4e-5, 1e-10, 1e-12], n)
     q[n:, 2] = sampling.turned(folded + rng.choice([-1.0, 1.0], n) * off)
     near = sampling.generic(rng, 2 * n)
     poses = poe.flange(g, q)

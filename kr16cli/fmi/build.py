@@ -1,0 +1,178 @@
+"""Build an FMU for co-simulation (FMI 2.0) with pythonfmu; equal input gives equal bytes."""
+
+from __future__ import annotations
+
+import importlib
+import io
+import os
+import shutil
+import sys
+import tempfile
+import time
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from html import escape
+from importlib import metadata
+from pathlib import Path
+from typing import NamedTuple
+
+import kr16cli
+from kr16cli.assets import asset
+from kr16cli.errors import InputError, MissingPartError
+from kr16cli.fmi import shim, stage, straight
+from kr16cli.fmi.cargo import Cargo
+from kr16cli.fmi.description import guid
+from kr16cli.fmi.variables import TYPES, Part, Start, Variable, table
+from kr16cli.robot import RobotData
+
+MODEL = "KR16"
+_SUBJECT = {Part.ROBOT: "Dynamics of", Part.CONTROLLER: "Controller for"}
+_UNUSED = tuple(f"/pythonfmu/{name}.py" for name in ("__main__", "csvbuilder", "deploy"))
+_OLDEST = (1980, 1, 1, 0, 0, 0)
+
+
+class Options(NamedTuple):
+    """What an FMU is made of.
+
+    `stop` and `step` (s) are the default experiment's. `compiler` is a C compiler for the shim
+    that lets programs other than Python load the FMU on Linux, or None for no shim.
+    """
+
+    start: Start
+    part: Part = Part.ROBOT
+    stop: float = 2.0
+    step: float = 0.01
+    scenario: str = ""
+    compiler: str | None = None
+
+
+def build(data: RobotData, options: Options) -> bytes:
+    """The content of an FMU of a robot.
+
+    Args:
+        data: the robot, with inertial data.
+        options: start values, default experiment, shim.
+
+    Returns:
+        The bytes of the .fmu file. With SOURCE_DATE_EPOCH set, equal input gives equal bytes.
+
+    Raises:
+        InputError: no inertial data, or a SOURCE_DATE_EPOCH that is no time.
+        MissingPartError: pythonfmu is not installed.
+        CheckFailedError: the compiler failed.
+    """
+    if not data.links:
+        raise InputError(f"{data.name} ({data.path}) has no inertial data; an FMU needs six links")
+    _epoch()
+    try:
+        builder = importlib.import_module("pythonfmu.builder").FmuBuilder
+    except ImportError:
+        raise MissingPartError("pythonfmu", "fmu") from None
+    cargo = Cargo(_about(data, options), table(data, options.start, options.part), data)
+    slave = asset("fmu/kr16_slave.py").read_text(encoding="utf-8")
+    files = stage.contents(cargo, straight.source(data), slave)
+    library = shim.compiled(options.compiler) if options.compiler else b""
+    version = metadata.version("pythonfmu")
+    digest = stage.identity(files, version.encode(), library)
+    with tempfile.TemporaryDirectory(prefix="kr16_fmu_") as folder:
+        here = Path(folder)
+        script = stage.stage(here / "resources", files, digest)
+        documentation = _documentation(here / "documentation", cargo, digest)
+        made = here / f"{MODEL}.fmu"
+        with _as_before(script):
+            builder.build_FMU(
+                script, dest=made, project_files=[stage.package_of(script)],
+                documentation_folder=documentation,
+            )  # fmt: skip
+        return _packed(made, library, guid(digest))
+
+
+def _about(data: RobotData, options: Options) -> dict[str, object]:
+    """Texts and times of the model description."""
+    scenario = f", set up as the scenario {options.scenario}" if options.scenario else ""
+    return {
+        "description": f"{_SUBJECT[options.part]} the {data.name}{scenario}. "
+        "Not affiliated with KUKA; not for safety functions.",
+        "part": str(options.part),
+        "robot": data.name,
+        "model_sha256": data.sha256,
+        "author": "kr16cli developers",
+        "version": kr16cli.__version__,
+        "copyright": "kr16cli developers",
+        "license": "MIT",
+        "tool": f"kr16cli {kr16cli.__version__} with PythonFMU {metadata.version('pythonfmu')}",
+        "stop": options.stop,
+        "step": options.step,
+    }
+
+
+@contextmanager
+def _as_before(script: Path) -> Iterator[None]:
+    """Leaves Python's path and modules as they were; the builder imports the script."""
+    path, known = list(sys.path), set(sys.modules)
+    sys.path.insert(0, str(script.parent))
+    try:
+        yield
+    finally:
+        sys.path[:] = path
+        package = stage.package_of(script).name
+        for name in set(sys.modules) - known:
+            if name.split(".")[0] in (package, script.stem):
+                del sys.modules[name]
+
+
+def _documentation(folder: Path, cargo: Cargo, digest: str) -> Path:
+    """The FMU's documentation folder: a page with the variables, and licences."""
+    shutil.copytree(asset("fmu/documentation"), folder)
+    page = folder / "index.html"
+    texts = {"identity": digest, **{key: str(value) for key, value in cargo.about.items()}}
+    text = page.read_text(encoding="utf-8")
+    for key, value in texts.items():
+        text = text.replace(f"{{{{{key}}}}}", escape(value))
+    rows = "\n".join(map(_row, cargo.variables))
+    page.write_bytes(text.replace("{{variables}}", rows).encode())
+    for file in metadata.files("pythonfmu") or ():
+        if file.name.upper().startswith("LICENSE"):
+            content = Path(str(file.locate())).read_bytes()
+            (folder / "licenses" / "pythonfmu.txt").write_bytes(content)
+    return folder
+
+
+def _row(v: Variable) -> str:
+    kind = TYPES[v.type]
+    start = (
+        "" if v.start is None else str(v.start).lower() if kind.base != "Real" else f"{v.start:.6g}"
+    )
+    cells = (v.name, v.causality, v.variability, kind.unit or kind.base, start, v.description)
+    return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"
+
+
+def _packed(made: Path, library: bytes, identity: str) -> bytes:
+    """The archive with its entries in order, compressed, all of one time, the shim put in."""
+    with zipfile.ZipFile(made) as archive:
+        names = [n for n in archive.namelist() if not n.endswith(("/", *_UNUSED))]
+        entries = {name: archive.read(name) for name in names}
+    if library:
+        entries = shim.put_in(entries, library, MODEL, identity)
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for name, content in sorted(entries.items()):
+            info = zipfile.ZipInfo(name, _epoch() or _OLDEST)
+            info.compress_type, info.create_system = zipfile.ZIP_DEFLATED, 3
+            info.external_attr = (0o100755 if name.startswith("binaries/") else 0o100644) << 16
+            archive.writestr(info, content)
+    return out.getvalue()
+
+
+def _epoch() -> tuple[int, int, int, int, int, int] | None:
+    """The time of SOURCE_DATE_EPOCH for a zip entry, or None where it is not set."""
+    text = os.environ.get("SOURCE_DATE_EPOCH")
+    if not text:
+        return None
+    try:
+        year, month, day, hour, minute, second = time.gmtime(int(text))[:6]
+    except (ValueError, OverflowError, OSError):
+        rule = "it must be seconds since 1970, a whole number"
+        raise InputError(f"SOURCE_DATE_EPOCH is {text!r}; {rule}") from None
+    return max((year, month, day, hour, minute, second - second % 2), _OLDEST)

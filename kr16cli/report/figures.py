@@ -1,0 +1,203 @@
+"""Curves, bars and maps: arrays in, Axes filled. Nothing is told by colour alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+from kr16cli.report.style import BLUE, GREEN, INK, LINES, MUTED, ORANGE, PINK, RED
+
+_HUES = (BLUE, ORANGE, GREEN, PINK, INK, "#56B4E9")
+_MARKS = ("o", "s", "^", "D", "v", "P")
+_HATCHES = ("", "////", "....", "xxxx", "\\\\\\\\", "++++")
+
+
+def margin_bars(
+    axis: Axes, middles: Sequence[float], margins: Sequence[float | None], failed: Sequence[bool]
+) -> None:
+    """Bars of error over tolerance beside the rows of a table; y is in points of the page.
+
+    A margin of zero has no bar; one that was not measured spans the axis.
+    """
+    shares = [10.0 if m is None else m for m in margins]
+    low = 1e-9
+    for y, share, bad in zip(middles, shares, failed, strict=True):
+        if share > 0:
+            top = min(max(share, 1.6 * low), 10.0)
+            axis.barh(
+                y, top - low, left=low, height=5.5, color=RED if bad else BLUE,
+                hatch="////" if bad else None, edgecolor="white", linewidth=0,
+            )  # fmt: skip
+    axis.set_xscale("log")
+    axis.set_xlim(low, 10.0)
+    axis.axvline(1.0, color=INK, lw=1.2)
+    axis.set_yticks([])
+    axis.xaxis.set_major_locator(LogLocator(numticks=20))
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.set_xticks([1e-9, 1e-6, 1e-3, 1.0])
+    axis.tick_params(axis="x", labelsize=7)
+    axis.spines["left"].set_visible(False)
+
+
+def residual_histogram(
+    axis: Axes, edges: Sequence[float], count: Sequence[int], tolerance: float, title: str
+) -> None:
+    """How many samples have which closing error, log-log, with the tolerance as a line."""
+    start = np.asarray(edges, dtype=float)
+    axis.bar(
+        start, np.maximum(count, 0), width=0.5, align="edge", color=BLUE, edgecolor="white", lw=0.5
+    )
+    axis.set_yscale("log")
+    axis.set_ylim(0.7, 3 * max(1, *count))
+    axis.set_xlim(-17, max(-8.5, math.log10(tolerance) + 0.5))
+    axis.axvline(math.log10(tolerance), color=INK, lw=1.2, ls=(0, (4, 2)))
+    axis.set_title(title, fontsize=8, fontweight="normal")
+    axis.set_xticks([-16, -14, -12, -10])
+    axis.tick_params(labelsize=7)
+    axis.yaxis.set_minor_formatter(NullFormatter())
+
+
+def counts(axis: Axes, values: Sequence[int], count: Sequence[int], label: str) -> None:
+    """A bar for each whole number."""
+    axis.bar(values, count, color=BLUE, width=0.7)
+    for v, n in zip(values, count, strict=True):
+        if n:
+            axis.annotate(
+                str(n), (v, n), (0, 2), textcoords="offset points", ha="center", fontsize=8
+            )
+    axis.set_xticks(list(values))
+    axis.set_ylim(0, 1.18 * max(count))
+    axis.set_xlabel(label)
+    axis.set_ylabel("poses")
+    axis.grid(visible=False, axis="x")
+
+
+def difference_curve(
+    axis: Axes, step: Sequence[float], error: Sequence[float], tolerance: float
+) -> None:
+    """Error of central differences against the step, with slopes 2 and -1 and the best step."""
+    h, e = np.asarray(step), np.asarray(error)
+    best = int(np.argmin(e))
+    axis.loglog(h, e, "o-", color=BLUE, label="largest error")
+    left, right = h >= h[best], h <= h[best]
+    axis.loglog(h[left], e[0] * (h[left] / h[0]) ** 2, color=MUTED, ls=LINES[1],
+                label="slope 2: truncation")  # fmt: skip
+    axis.loglog(h[right], e[-1] * h[-1] / h[right], color=MUTED, ls=LINES[2],
+                label="slope -1: rounding")  # fmt: skip
+    axis.axhline(tolerance, color=INK, ls=(0, (4, 2)), lw=1.2)
+    axis.annotate("tolerance of the best step", (h[0], tolerance), (0, 3),
+                  textcoords="offset points", ha="right", fontsize=8)  # fmt: skip
+    axis.annotate(f"best: {e[best]:.1e} at h = {h[best]:.0e}", (h[best], e[best]), (0, -12),
+                  textcoords="offset points", ha="center", fontsize=8)  # fmt: skip
+    axis.set_ylim(e[best] / 12, None)
+    axis.set_xlabel("step h, rad")
+    axis.set_ylabel("largest |difference - Jacobian|, m")
+    axis.legend(loc="upper center")
+
+
+def order_curves(axis: Axes, methods: Sequence[tuple[str, Any, Any, float]]) -> None:
+    """Error against step for (name, steps, errors, expected order), with the expected slopes."""
+    for k, (name, step, error, order) in enumerate(methods):
+        h, e = np.asarray(step), np.asarray(error)
+        axis.loglog(h, e, marker=_MARKS[k], ls="", color=_HUES[k], label=name)
+        wide = np.array([h.max() * 1.15, h.min() / 1.15])
+        axis.loglog(wide, e[0] * (wide / h[0]) ** order, color=_HUES[k], ls=LINES[k],
+                    label=f"slope {order:g}, as claimed")  # fmt: skip
+    axis.set_xticks(sorted({h for _, step, _, _ in methods for h in step}))
+    axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.set_xlabel("step, s")
+    axis.set_ylabel("largest error of a joint at the end, rad")
+    axis.legend(loc="lower right")
+
+
+def history(
+    axis: Axes, time: Sequence[float], curves: Sequence[tuple[str, Any]], tolerance: float,
+    label: str,
+) -> None:  # fmt: skip
+    """Small errors over time on a log axis, with their tolerance; zeros are left out."""
+    for k, (name, values) in enumerate(curves):
+        y = np.where(np.asarray(values) > 0, values, np.nan)
+        axis.semilogy(time, y, color=_HUES[k], ls=LINES[k], marker=_MARKS[k], ms=3, label=name)
+    axis.axhline(tolerance, color=INK, ls=(0, (4, 2)), lw=1.2, label="tolerance")
+    axis.set_ylim(None, 3 * max(tolerance, axis.get_ylim()[1]))
+    axis.set_xlabel("time, s")
+    axis.set_ylabel(label)
+    axis.legend(loc="upper right", bbox_to_anchor=(1.0, -0.13), ncols=3)
+
+
+def torque_curves(axis: Axes, time: Any, tau: Any, limit: Any, names: Sequence[str]) -> None:
+    """Torque over limit of every joint, with the limits."""
+    share = np.asarray(tau) / np.asarray(limit)
+    for k, name in enumerate(names):
+        axis.plot(time, share[:, k], color=_HUES[k], ls=LINES[k], label=name)
+        at = int(np.argmax(np.abs(share[:, k])))
+        axis.plot(time[at], share[at, k], marker=_MARKS[k], color=_HUES[k])
+    for value in (-1.0, 1.0):
+        axis.axhline(value, color=INK, ls=(0, (4, 2)), lw=1.2)
+    axis.annotate("limit", (time[-1], 1.0), (0, -11), textcoords="offset points", ha="right",
+                  fontsize=8)  # fmt: skip
+    axis.set_ylim(-1.25, 1.25)
+    axis.set_xlim(time[0], time[-1])
+    axis.set_xlabel("time, s")
+    axis.set_ylabel("torque / limit")
+    axis.legend(ncols=6, loc="upper center", bbox_to_anchor=(0.5, 1.11))
+
+
+def heat_map(
+    axis: Axes,
+    x: Any,
+    y: Any,
+    values: Any,
+    labels: tuple[str, str],
+    title: str,
+    *,
+    log: bool = False,
+    cut: tuple[float, float] | None = None,
+) -> None:
+    """A rasterised map with its own scale beside it."""
+    from matplotlib.colors import LogNorm, Normalize
+
+    shown = np.asarray(values, dtype=float)
+    low, high = cut or (float(np.nanmin(shown)), float(np.nanmax(shown)))
+    norm = LogNorm(low, high) if log else Normalize(low, high)
+    image = axis.pcolormesh(
+        x, y, np.clip(shown, low, high), norm=norm, shading="nearest", rasterized=True
+    )
+    axis.set_xlabel(labels[0], labelpad=2)
+    axis.set_ylabel(labels[1], labelpad=2)
+    axis.set_title(title, fontsize=8.5)
+    axis.grid(visible=False)
+    bar = axis.figure.colorbar(image, ax=axis, pad=0.03, fraction=0.06)
+    bar.ax.tick_params(labelsize=7)
+    bar.outline.set_linewidth(0.5)
+
+
+def zero_lines(axis: Axes, x: Any, y: Any, families: Mapping[str, Any]) -> None:
+    """Where factors of the determinant vanish, a dash pattern for each family."""
+    for k, values in enumerate(families.values()):
+        if np.min(values) < 0 < np.max(values):
+            axis.contour(x, y, values, levels=[0.0], colors=["white"], linewidths=[2.4])
+            axis.contour(x, y, values, levels=[0.0], colors=["#D00000"], linewidths=[1.1],
+                         linestyles=[LINES[k]])  # fmt: skip
+
+
+def bars(
+    axis: Axes, names: Sequence[str], groups: Mapping[str, Sequence[float]], limit: float
+) -> None:
+    """Groups of horizontal bars, told apart by hatch, with a limit."""
+    height = 0.8 / len(groups)
+    for k, (label, values) in enumerate(groups.items()):
+        y = np.arange(len(names)) + (k - (len(groups) - 1) / 2) * height
+        axis.barh(y, values, height=height * 0.9, color=_HUES[k], hatch=_HATCHES[k],
+                  edgecolor="white", lw=0.4, label=label)  # fmt: skip
+    axis.axvline(limit, color=INK, ls=(0, (4, 2)), lw=1.2)
+    axis.set_yticks(np.arange(len(names)), names)
+    axis.invert_yaxis()
+    axis.grid(visible=False, axis="y")
+    axis.set_xlim(0, 1.1 * limit)

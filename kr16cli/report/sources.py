@@ -1,0 +1,157 @@
+"""Where results come from: a run of the suites, or files that other commands wrote."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+from kr16cli.errors import FileError, InputError
+from kr16cli.report.content import Evidence, Timing, sha256
+from kr16cli.robot import RobotData
+from kr16cli.simulate.run import load_run
+from kr16cli.verify import registry
+from kr16cli.verify.records import Result, Setting
+
+_SCHEMA = "kr16.verify/1"
+_TIMES = "kr16.bench/1"
+_NEEDED = ("id", "group", "title", "method", "grade", "tolerance", "status", "evidence")
+_PLAIN: dict[str, Any] = {
+    "statement": "", "regime": "", "unit": "", "reason": "", "error": None, "samples": 0,
+    "seed": 0, "worst": {}, "equations": (), "functions": (), "figures": {},
+}  # fmt: skip
+
+
+def run_suites(
+    suites: Sequence[str], setting: Setting, progress: Callable[[int, int, str], None] | None = None
+) -> Evidence:
+    """Run the suites; `progress` is told how many cases are done, of how many, and the last."""
+    cases = registry.cases(suites)
+    results = []
+    for result in registry.run(cases, setting):
+        results.append(result)
+        if progress:
+            progress(len(results), len(cases), result.id)
+    words = "quick run: fewer samples" if setting.quick else "full run"
+    return Evidence(tuple(results), setting.seed, setting.quick, f"run for this report ({words})")
+
+
+def read(paths: Sequence[str | Path], suites: Sequence[str], data: RobotData) -> Evidence:
+    """What files hold: results of `kr16 verify --json`, a run's npz, times of `kr16 bench`.
+
+    Args:
+        paths: the files, in any order; later results of a case replace earlier ones.
+        suites: only their cases are kept.
+        data: the robot; results of another model are refused.
+
+    Raises:
+        FileError: a file that cannot be read or holds something else.
+        InputError: results of another model.
+    """
+    found = Evidence((), None, None, "read from " + ", ".join(Path(p).name for p in paths))
+    for path in paths:
+        content = _bytes(path)
+        found = replace(found, files=(*found.files, (Path(path).name, sha256(content))))
+        if content[:2] == b"PK":
+            run = load_run(path)
+            _same_model(path, run.model_sha256, run.robot, data)
+            found = replace(found, run=run)
+        else:
+            found = _joined(found, path, _table(path, content), suites, data)
+    if not (found.results or found.run):
+        raise FileError(paths[0], f"holds no case of the suites {', '.join(suites)}")
+    return found
+
+
+def _joined(
+    found: Evidence, path: str | Path, table: Mapping[str, Any], suites: Sequence[str],
+    data: RobotData,
+) -> Evidence:  # fmt: skip
+    """The evidence with a JSON file added."""
+    if table.get("schema") == _TIMES:
+        return replace(found, bench=_timings(path, table), machine=_machine(table))
+    if table.get("schema") != _SCHEMA:
+        raise FileError(
+            path, "is neither a result of kr16 verify --json or kr16 bench --json nor a run"
+        )
+    _same_model(path, str(table.get("model_sha256")), str(table.get("robot")), data)
+    try:
+        cases = [_result(entry) for entry in table["result"]["cases"]]
+    except (KeyError, TypeError, ValueError) as error:
+        raise FileError(path, f"holds a case that is not whole: {error}") from None
+    asked = table.get("input") or {}
+    kept = {r.id: r for r in (*found.results, *cases) if r.group in suites}
+    return replace(
+        found, results=tuple(kept.values()), seed=asked.get("seed"), quick=asked.get("quick")
+    )
+
+
+def _result(entry: Mapping[str, Any]) -> Result:
+    for key in _NEEDED:
+        if key not in entry:
+            raise KeyError(f"{entry.get('id', 'a case')} lacks {key}")
+    known = {f.name for f in fields(Result)}
+    values = _PLAIN | {k: v for k, v in entry.items() if k in known}
+    if values["status"] not in ("passed", "failed", "skipped"):
+        raise ValueError(f"status of {values['id']} is {values['status']!r}")
+    for key in ("error", "tolerance"):
+        if values[key] is not None:
+            values[key] = float(values[key])
+    for key in ("equations", "functions"):
+        values[key] = tuple(values[key])
+    return Result(**values)
+
+
+def _bytes(path: str | Path) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise FileError(path, f"cannot be read: {error.strerror or error}") from None
+
+
+def _table(path: str | Path, content: bytes) -> Mapping[str, Any]:
+    try:
+        table = json.loads(content)
+    except ValueError as error:
+        raise FileError(path, f"is no JSON: {error}") from None
+    if not isinstance(table, dict):
+        raise FileError(path, "is no JSON object; give what kr16 verify --json wrote")
+    return table
+
+
+def _same_model(path: str | Path, sha: str, name: str, data: RobotData) -> None:
+    if sha != data.sha256:
+        raise InputError(
+            f"{path} is of {name}, model {sha[:12]}; the robot is {data.name}, model "
+            f"{data.sha256[:12]}; give its parameter file with --robot"
+        )
+
+
+def _timings(path: str | Path, table: Mapping[str, Any]) -> tuple[Timing, ...]:
+    """Rows of a file of `kr16 bench --json`."""
+    try:
+        rows = [_timing(row) for row in table["result"]["rows"]]
+    except (KeyError, TypeError, ValueError) as error:
+        raise FileError(path, f"holds times that are not whole: {error}") from None
+    return tuple(rows)
+
+
+def _timing(row: Mapping[str, Any]) -> Timing:
+    peers = row.get("peers") or {}
+    return Timing(
+        str(row["quantity"]),
+        float(row["batch_ns"]),
+        float(row["threads_ns"]),
+        float(row["call_ns"]),
+        peer=min(peers, key=lambda name: float(peers[name])) if peers else "",
+        ratio=None if row.get("ratio") is None else float(row["ratio"]),
+    )
+
+
+def _machine(table: Mapping[str, Any]) -> str:
+    result, given = table["result"], table.get("input") or {}
+    about = result.get("machine") or {}
+    parts = [f"{key} {value}" for key, value in (*about.items(), *given.items())]
+    return f"engine {result.get('engine')}, " + ", ".join(parts)
