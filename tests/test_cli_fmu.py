@@ -18,6 +18,7 @@ from kr16cli.assets import asset
 from kr16cli.fmi import child, play
 from kr16cli.fmi.variables import Part, Start
 
+_SLOW = pytest.mark.slow
 _SCHEMA = json.loads(asset("data/schemas/fmu.json").read_text(encoding="utf-8"))
 
 
@@ -87,10 +88,16 @@ def test_check_passes_what_was_built(part: Part) -> None:
     ("name", "old", "new", "words"),
     [
         ("cargo.json", '"d4": 0.67', '"d4": 0.66', "pose deviates"),
-        ("/model/energy.py", "return", "return 1.001 *", "energy deviates"),
-        ("fmi/machine.py", 'list(saved["state"])', "[0.0] * 12", "a state set back"),
-        ("fmi/outputs.py", "return s.plant.acceleration(", "return [0.0] * 6 or (", "qdd deviates"),
-        ("modelDescription.xml", 'unit="N.m"', 'unit="lbf"', "lbf"),
+        pytest.param(
+            "/model/energy.py", "return", "return 1.001 *", "energy deviates", marks=_SLOW
+        ),
+        pytest.param(
+            "fmi/machine.py", 'list(saved["state"])', "[0.0] * 12", "a state set back", marks=_SLOW
+        ),
+        pytest.param(
+            "fmi/outputs.py", "s.plant.acceleration(", "[0.0] * 6 or (", "qdd deviates", marks=_SLOW
+        ),
+        pytest.param("modelDescription.xml", 'unit="N.m"', 'unit="lbf"', "lbf", marks=_SLOW),
         ("fmi/machine.py", "from __future__ import annotations", "import kr16cli", "kr16cli"),
     ],
 )

@@ -8,6 +8,7 @@ import math
 import shutil
 import subprocess
 import sys
+import tempfile
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -85,10 +86,24 @@ def test_bad_source_date_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_building_leaves_python_as_it_was() -> None:
-    path = list(sys.path)
-    fmus.content()
+    path, modules = list(sys.path), dict(sys.modules)
+    build.build(kr16cli.load_data(), build.Options(Start(q=BENT, mode=2, drives=True)))
     assert sys.path == path
-    assert not [name for name in sys.modules if name.startswith(("kr16_core_", "kr16_slave_"))]
+    ours = ("kr16_core_", "kr16_slave_")
+    left = {k: v for k, v in sys.modules.items() if k.startswith(ours)}
+    assert left == {k: v for k, v in modules.items() if k.startswith(ours)}
+
+
+def test_what_runs_in_this_process_can_be_built_in_it_again() -> None:
+    options = build.Options(Start(q=BENT, mode=2))
+    first = build.build(kr16cli.load_data(), options)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "KR16.fmu"
+        path.write_bytes(first)
+        with fmus.hosted(path, fmpy.extract(str(path), folder)) as host:
+            host.begin()
+    again = build.build(kr16cli.load_data(), options)
+    assert _description(again).get("guid") == _description(first).get("guid")
 
 
 def test_missing_pythonfmu_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -299,6 +314,7 @@ for host in several:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("with_shim", _SHIM)
 def test_many_runs_failures_and_instances_in_one_process(with_shim: bool) -> None:
     assert _isolated(_MANY, fmus.file(with_shim=with_shim)).strip() == "10"

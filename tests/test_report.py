@@ -9,7 +9,6 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -51,6 +50,10 @@ def _made(id: str, **changes: Any) -> Result:
         worst={"command": "kr16 fk 1.5 2.5 -3.5 4.5 5.5 6.5"}, evidence="twelve samples",
     )  # fmt: skip
     return dataclasses.replace(plain, **changes)
+
+
+_Word = tuple[str, float, tuple[float, float, float, float]]
+"""Text, size, and the box it fills: left, top, right, bottom in points."""
 
 
 @cache
@@ -96,10 +99,15 @@ def _content(
     plan = outline(kind)
     robot = robot or kr16cli.load_robot()
     shown = tuple(r for r in results or _results() if r.group in plan.suites)
-    names = [name for page in plan.pages for name in build.DRAWN.get(page, ())]
-    made, absent = drawings.draw(names, Setting(robot, quick=True))
+    names = tuple(name for page in plan.pages for name in build.DRAWN.get(page, ()))
+    made, absent = _drawings(names, robot.data.path)
     found = Evidence(shown, 20161, True, "made by a test", **evidence)
     return Content(plan, robot.data, found, made, absent, _WHEN)
+
+
+@cache
+def _drawings(names: tuple[str, ...], path: str) -> tuple[dict[str, Any], dict[str, str]]:
+    return drawings.draw(names, Setting(kr16cli.load_robot(path), quick=True))
 
 
 class _Recorder(RendererBase):
@@ -107,7 +115,7 @@ class _Recorder(RendererBase):
 
     def __init__(self) -> None:
         super().__init__()
-        self.words: list[tuple[str, float, tuple[float, float, float, float]]] = []
+        self.words: list[_Word] = []
 
     def get_canvas_width_height(self) -> tuple[float, float]:
         return WIDTH, HEIGHT
@@ -144,30 +152,40 @@ def _run() -> Run:
     return simulate(kr16cli.load_data(), scenario)
 
 
-def _words(figure: Figure) -> list[tuple[str, float, tuple[float, float, float, float]]]:
+def _words(figure: Figure) -> list[_Word]:
     recorder = _Recorder()
     with styled():
         figure.draw(recorder)
     return recorder.words
 
 
-def _pages(kind: str) -> Iterator[tuple[int, Figure]]:
-    yield from enumerate(_figures(kind), 1)
+@cache
+def _drawn(kind: str) -> list[list[_Word]]:
+    """The words of every page of a report."""
+    return [_words(figure) for figure in _figures(kind)]
+
+
+def _said(content: Content) -> list[str]:
+    """All words of a report's pages but those of its figures."""
+    with styled():
+        document = build.compose(content)
+    document.finish()
+    return [piece.text for page in document.pages for piece in page.words.pieces]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_word_leaves_the_sheet(kind: str) -> None:
-    for n, figure in _pages(kind):
-        for text, _, (left, top, right, bottom) in _words(figure):
+    for n, drawn in enumerate(_drawn(kind), 1):
+        for text, _, (left, top, right, bottom) in drawn:
             inside = left >= 20 and right <= WIDTH - 20 and top >= 20 and bottom <= HEIGHT - 20
             assert inside, f"page {n}: {text!r} at {left:.0f} {top:.0f} {right:.0f} {bottom:.0f}"
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_two_words_overlap(kind: str) -> None:
-    for n, figure in _pages(kind):
+    for n, drawn in enumerate(_drawn(kind), 1):
         # Indices of formulas stand above one another by design.
-        words = [(text, box) for text, size, box in _words(figure) if size >= 6.9]
+        words = [(text, box) for text, size, box in drawn if size >= 6.9]
         words.sort(key=lambda word: word[1][1])
         for i, (text, (left, top, right, bottom)) in enumerate(words):
             for other, (l2, t2, r2, b2) in itertools.islice(words, i + 1, None):
@@ -180,21 +198,18 @@ def test_no_two_words_overlap(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_page_has_its_footer_and_says_which_of_how_many(kind: str) -> None:
-    figures = _figures(kind)
+    pages = _drawn(kind)
     sha = kr16cli.load_data().sha256[:12]
-    for n, figure in _pages(kind):
-        shown = [text for text, _, (_, top, _, _) in _words(figure) if top > HEIGHT - 60]
+    for n, drawn in enumerate(pages, 1):
+        shown = [text for text, _, (_, top, _, _) in drawn if top > HEIGHT - 60]
         assert any(kr16cli.__version__ in t and sha in t for t in shown), n
-        assert any(t.endswith(f"page {n} of {len(figures)}") for t in shown), n
+        assert any(t.endswith(f"page {n} of {len(pages)}") for t in shown), n
 
 
 def test_the_verification_report_has_all_its_pages() -> None:
-    content = _content()
-    with styled():
-        document = build.compose(content)
-    assert set(content.left_out) == {"speed"}
-    assert len(document.pages) >= 16
-    text = "\n".join(word for page in document.finish() for word, *_ in _words(page))
+    assert set(_left_out("verification")) == {"speed"}
+    assert len(_drawn("verification")) >= 16
+    text = "\n".join(word for page in _drawn("verification") for word, *_ in page)
     for said in (
         "PASSED: all", "not validated on a robot", "Not affiliated with KUKA", "0.158 or 0.115",
         "OUTSIDE LIMITS", "audit only", "NASA-STD-7009B", "kr16 fk 1.5 2.5 -3.5 4.5 5.5 6.5",
@@ -208,23 +223,20 @@ def test_the_verification_report_has_all_its_pages() -> None:
 
 def test_a_failed_case_is_red_and_says_so_in_words() -> None:
     bad = dataclasses.replace(_results()[0], status="failed", error=3e-3, evidence="off by a lot")
-    with styled():
-        pages = build.compose(_content("kinematics", (bad, *_results()[1:]))).finish()
-    text = "\n".join(word for page in pages for word, *_ in _words(page))
+    content = _content("kinematics", (bad, *_results()[1:]))
+    text = "\n".join(_said(content))
     assert "FAILED: 1 of" in text
     assert "PASSED" not in text
     assert f"FAILED {bad.id}: off by a lot" in text
-    assert _red(pages[0]) > 500
     with styled():
-        good = build.compose(_content("kinematics")).finish()
-    assert _red(good[0]) == 0
+        page = build.compose(content).finish()[0]
+    assert _red(page) > 500
+    assert _red(_figures("kinematics")[0]) == 0
 
 
 def test_a_case_that_raised_leads_the_list_of_margins() -> None:
     bad = dataclasses.replace(_results()[0], status="failed", error=None, evidence="ValueError: x")
-    with styled():
-        pages = build.compose(_content("kinematics", (*_results()[1:], bad))).finish()
-    words = [word for word, *_ in _words(pages[0])]
+    words = _said(_content("kinematics", (*_results()[1:], bad)))
     assert "not measured" in words
     assert any(w.startswith("FAILED: 1 of") for w in words)
 
@@ -242,7 +254,7 @@ def _red(figure: Figure) -> int:
 
 
 def test_every_page_puts_ink_on_paper_when_rendered() -> None:
-    for n, figure in _pages("dynamics"):
+    for n, figure in enumerate(_figures("dynamics"), 1):
         canvas = FigureCanvasAgg(figure)
         with styled():
             canvas.draw()
@@ -261,7 +273,7 @@ def _pdf(kind: str) -> bytes:
 
 def test_text_can_be_extracted_from_every_page_and_fonts_are_embedded() -> None:
     pypdf = pytest.importorskip("pypdf")
-    reader = pypdf.PdfReader(BytesIO(_pdf("kinematics")))
+    reader = pypdf.PdfReader(BytesIO(_pdf("simulation")))
     for n, page in enumerate(reader.pages, 1):
         text = page.extract_text()
         assert f"page {n} of {len(reader.pages)}" in text
@@ -274,10 +286,10 @@ def test_text_can_be_extracted_from_every_page_and_fonts_are_embedded() -> None:
 
 
 def test_metadata_names_the_model_and_the_time_asked_for() -> None:
-    pdf = _pdf("kinematics")
+    pdf = _pdf("simulation")
     sha = kr16cli.load_data().sha256
     assert f"/Keywords (model {sha})".encode() in pdf
-    assert b"/Title (Kinematics report: KUKA KR 16-2)" in pdf
+    assert b"/Title (Simulation report: KUKA KR 16-2)" in pdf
     assert b"/Author (kr16cli)" in pdf
     assert b"/CreationDate (D:20260102000000Z)" in pdf
 
@@ -328,14 +340,15 @@ def test_saved_results_are_read_back_as_they_were(tmp_path: Path) -> None:
 
 
 def test_results_without_figures_still_give_a_report_that_says_so(tmp_path: Path) -> None:
-    saved = _saved("kinematics")
+    saved = _saved("simulation")
     for case in saved["result"]["cases"]:
         del case["figures"]
     source, target = tmp_path / "results.json", tmp_path / "report.pdf"
     source.write_text(json.dumps(saved), encoding="utf-8")
-    done = kr16("report", "kinematics", "--from", source, "-o", target)
+    done = kr16("report", "simulation", "--from", source, "-o", target)
     assert done.code == 0
-    assert "no page on closure" in done.err and "no page on jacobian" in done.err
+    assert "no page on orders: case simulation.order: no figure data in the file" in done.err
+    assert "no page on energy" in done.err and "run" not in done.err.split()
     assert target.read_bytes().startswith(b"%PDF")
 
 
@@ -352,14 +365,15 @@ def test_a_failed_case_makes_the_exit_code_1(tmp_path: Path) -> None:
 def test_a_recorded_run_is_drawn_and_nothing_is_run(tmp_path: Path) -> None:
     source, target = tmp_path / "run.npz", tmp_path / "run.pdf"
     source.write_bytes(_run().to_npz())
-    assert kr16("report", "simulation", "--from", source, "-o", target).code == 0
+    done = kr16("report", "simulation", "--from", source, "-o", target)
+    assert (done.code, done.out) == (0, "")
+    assert target.read_bytes().startswith(b"%PDF")
     content = build.gather("simulation", Setting(kr16cli.load_robot()), [source])
-    with styled():
-        document = build.compose(content)
-    words = [word for page in document.finish() for word, *_ in _words(page)]
     assert content.results == ()
+    words = _said(content)
     assert any("NO CHECKS" in word for word in words)
-    assert "angle, deg" in words
+    assert "Recorded motion rest" in words
+    assert "angle, deg" in [word for page in _drawn("simulation") for word, *_ in page]
 
 
 def test_measured_times_are_shown_only_where_given(tmp_path: Path) -> None:
@@ -374,8 +388,7 @@ def test_measured_times_are_shown_only_where_given(tmp_path: Path) -> None:
     results.write_text(json.dumps(_saved("dynamics")), encoding="utf-8")
     times.write_text(json.dumps(bench), encoding="utf-8")
     content = build.gather("dynamics", Setting(kr16cli.load_robot()), [results, times])
-    with styled():
-        words = [w for page in build.compose(content).finish() for w, *_ in _words(page)]
+    words = _said(content)
     assert {"41.2", "Pinocchio", "7.5"} <= set(words)
     assert "speed" in _left_out("dynamics")
 
@@ -389,13 +402,12 @@ def _left_out(kind: str) -> dict[str, str]:
 
 def test_an_arm_without_inertias_has_a_report_without_their_pages() -> None:
     robot = kr16cli.load_robot("kr16_l6")
-    content = _content(robot=robot)
-    with styled():
-        document = build.compose(content)
+    content = _content("dynamics", robot=robot)
+    words = _said(content)
     assert {"mass_centres", "torques"} <= set(content.left_out)
     assert "no inertial data" in content.left_out["torques"]
-    words = [word for page in document.finish() for word, *_ in _words(page)]
-    assert "The working envelope at A1 = 0" in words
+    assert any(word.startswith("torques: KUKA KR 16 L6 has no") for word in words)
+    assert "The working envelope at A1 = 0" in _said(_content("kinematics", robot=robot))
 
 
 # Refusals ------------------------------------------------------------------------------------

@@ -127,9 +127,17 @@ static int own_folder(char *folder) {
     return 1;
 }
 
+/* Python that starts in a host takes paths for ASCII where no locale is set; they are UTF-8. */
+static void expect_utf8(void) {
+    int (*initialized)(void) = (int (*)(void))dlsym(RTLD_DEFAULT, "Py_IsInitialized");
+    int *mode = dlsym(RTLD_DEFAULT, "Py_UTF8Mode");
+    if (mode && initialized && !initialized()) *mode = 1;
+}
+
 static void load(void) {
     char path[TEXT + 32];
     if (!find_python()) return;
+    expect_utf8();
     if (!own_folder(path)) {
         snprintf(problem, TEXT, "the FMU's library cannot tell where it lies");
         return;

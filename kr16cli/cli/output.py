@@ -56,8 +56,20 @@ class Target:
                 if self._path.is_dir():
                     raise FileError(self._path, "is a directory; name a file in it")
                 if not _is_special(self._path):
-                    self._temporary = _beside(self._path)
+                    self._open_beside(self._path)
         return self
+
+    def _open_beside(self, path: Path) -> None:
+        """A new empty file in the same folder; fails now if the output could not be written."""
+        if path.exists() and not os.access(path, os.W_OK):
+            raise FileError(path, "cannot be written: no permission; choose another name")
+        temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+        try:
+            temporary.touch(exist_ok=False)
+            self._temporary = temporary
+        except (KeyboardInterrupt, SystemExit):  # a signal between the two
+            temporary.unlink(missing_ok=True)
+            raise
 
     def __exit__(
         self,
@@ -114,15 +126,6 @@ class _as_file_error:  # noqa: N801  (reads as a statement)
 def _is_special(path: Path) -> bool:
     """A device, pipe or socket: anything that exists and is no regular file or folder."""
     return path.exists() and not path.is_file() and not path.is_dir()
-
-
-def _beside(path: Path) -> Path:
-    """A new empty file in the same folder; fails now if the output could not be written later."""
-    if path.exists() and not os.access(path, os.W_OK):
-        raise FileError(path, "cannot be written: no permission; choose another name")
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    temporary.touch(exist_ok=False)
-    return temporary
 
 
 def _permissions(path: Path) -> int:

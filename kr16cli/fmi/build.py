@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from html import escape
 from importlib import metadata
 from pathlib import Path
+from types import ModuleType
 from typing import NamedTuple
 
 import kr16cli
@@ -109,17 +110,25 @@ def _about(data: RobotData, options: Options) -> dict[str, object]:
 
 @contextmanager
 def _as_before(script: Path) -> Iterator[None]:
-    """Leaves Python's path and modules as they were; the builder imports the script."""
-    path, known = list(sys.path), set(sys.modules)
+    """Leaves Python's path and modules as they were; the builder imports the script.
+
+    The same build may be in the process already, hosted from a folder that is gone.
+    """
+    path, hosted = list(sys.path), _taken(script)
     sys.path.insert(0, str(script.parent))
     try:
         yield
     finally:
         sys.path[:] = path
-        package = stage.package_of(script).name
-        for name in set(sys.modules) - known:
-            if name.split(".")[0] in (package, script.stem):
-                del sys.modules[name]
+        _taken(script)
+        sys.modules.update(hosted)
+
+
+def _taken(script: Path) -> dict[str, ModuleType]:
+    """The modules of a staged script and its package, taken out of Python's table."""
+    roots = (stage.package_of(script).name, script.stem)
+    names = [name for name in sys.modules if name.split(".")[0] in roots]
+    return {name: sys.modules.pop(name) for name in names}
 
 
 def _documentation(folder: Path, cargo: Cargo, digest: str) -> Path:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from matplotlib import rc_context
+
 from kr16cli.report import figures, motion_figures, robot_figures
 from kr16cli.report.content import Content, LackingError
 from kr16cli.report.page import FULL, HEIGHT, LEFT, RIGHT, Document
@@ -159,7 +161,7 @@ def engines(document: Document, content: Content) -> None:
         raise LackingError("the results hold no case of the suite engines")
     title = headline(
         results,
-        f"{' and '.join(names)} agree: same numbers, other code",
+        f"{_listed(names)} agree: same numbers, other code",
         "other engines",
     )
     page = document.page(title)
@@ -181,20 +183,31 @@ def engines(document: Document, content: Content) -> None:
     page.bullets([f"skipped: {reason}" for reason in reasons], size=8)
 
 
+def _listed(names: list[str]) -> str:
+    *first, last = names or ["Nothing"]
+    return f"{', '.join(first)} and {last}" if first else last
+
+
 def run(document: Document, content: Content) -> None:
     """A recorded motion, if one was given."""
     recorded = content.evidence.run
     if recorded is None:
         raise LackingError("no run was given; kr16 simulate -o RUN.npz makes one")
-    for figure in (
-        motion_figures.joint_figure(recorded, content.data.joints),
-        motion_figures.flange_figure(recorded),
-    ):
+    with rc_context({"axes.titley": None, "axes.titlelocation": "center"}):  # as they are made for
+        drawn = (
+            motion_figures.joint_figure(recorded, content.data.joints),
+            motion_figures.flange_figure(recorded),
+        )
+    for figure in drawn:
+        figure.suptitle("")  # the page has its own title
         layout = figure.get_layout_engine()
         if layout is not None:
-            bottom = 60 / HEIGHT
-            layout.set(rect=(0.05, bottom, 0.9, 0.96 - bottom))  # type: ignore[call-arg]
-        document.adopt(figure)
+            bottom, top = 60 / HEIGHT, 1 - 88 / HEIGHT
+            layout.set(rect=(0.05, bottom, 0.9, top - bottom))  # type: ignore[call-arg]
+        for legend in figure.legends:
+            legend.set_bbox_to_anchor((0.5, 44 / HEIGHT), transform=figure.transFigure)
+        state = "" if recorded.complete else f", INCOMPLETE: {recorded.failure or recorded.stopped}"
+        document.adopt(figure, f"Recorded motion {recorded.scenario['name']}{state}")
 
 
 def speed(document: Document, content: Content) -> None:

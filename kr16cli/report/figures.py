@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import StrMethodFormatter
 
 from kr16cli.report.style import BLUE, GREEN, INK, LINES, MUTED, ORANGE, PINK, RED
 
@@ -24,22 +24,26 @@ def margin_bars(
 
     A margin of zero has no bar; one that was not measured spans the axis.
     """
-    shares = [10.0 if m is None else m for m in margins]
-    low = 1e-9
-    for y, share, bad in zip(middles, shares, failed, strict=True):
-        if share > 0:
-            top = min(max(share, 1.6 * low), 10.0)
-            axis.barh(
-                y, top - low, left=low, height=5.5, color=RED if bad else BLUE,
-                hatch="////" if bad else None, edgecolor="white", linewidth=0,
-            )  # fmt: skip
+    low, high = 1e-9, 10.0
+    share = np.array([high if m is None else m for m in margins])
+    drawn, bad = share > 0, np.asarray(failed)
+    for group, hatch, color in ((drawn & ~bad, None, BLUE), (drawn & bad, "////", RED)):
+        axis.barh(
+            np.asarray(middles)[group],
+            np.clip(share[group], 1.6 * low, high) - low,
+            left=low,
+            height=5.5,
+            color=color,
+            hatch=hatch,
+            edgecolor="white",
+            linewidth=0,
+        )
     axis.set_xscale("log")
-    axis.set_xlim(low, 10.0)
+    axis.set_xlim(low, high)
     axis.axvline(1.0, color=INK, lw=1.2)
     axis.set_yticks([])
-    axis.xaxis.set_major_locator(LogLocator(numticks=20))
-    axis.xaxis.set_minor_formatter(NullFormatter())
     axis.set_xticks([1e-9, 1e-6, 1e-3, 1.0])
+    axis.minorticks_off()
     axis.tick_params(axis="x", labelsize=7)
     axis.spines["left"].set_visible(False)
 
@@ -59,7 +63,7 @@ def residual_histogram(
     axis.set_title(title, fontsize=8, fontweight="normal")
     axis.set_xticks([-16, -14, -12, -10])
     axis.tick_params(labelsize=7)
-    axis.yaxis.set_minor_formatter(NullFormatter())
+    axis.minorticks_off()
 
 
 def counts(axis: Axes, values: Sequence[int], count: Sequence[int], label: str) -> None:
@@ -95,6 +99,7 @@ def difference_curve(
     axis.annotate(f"best: {e[best]:.1e} at h = {h[best]:.0e}", (h[best], e[best]), (0, -12),
                   textcoords="offset points", ha="center", fontsize=8)  # fmt: skip
     axis.set_ylim(e[best] / 12, None)
+    axis.minorticks_off()
     axis.set_xlabel("step h, rad")
     axis.set_ylabel("largest |difference - Jacobian|, m")
     axis.legend(loc="upper center")
@@ -110,7 +115,7 @@ def order_curves(axis: Axes, methods: Sequence[tuple[str, Any, Any, float]]) -> 
                     label=f"slope {order:g}, as claimed")  # fmt: skip
     axis.set_xticks(sorted({h for _, step, _, _ in methods for h in step}))
     axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.minorticks_off()
     axis.set_xlabel("step, s")
     axis.set_ylabel("largest error of a joint at the end, rad")
     axis.legend(loc="lower right")
@@ -125,6 +130,7 @@ def history(
         y = np.where(np.asarray(values) > 0, values, np.nan)
         axis.semilogy(time, y, color=_HUES[k], ls=LINES[k], marker=_MARKS[k], ms=3, label=name)
     axis.axhline(tolerance, color=INK, ls=(0, (4, 2)), lw=1.2, label="tolerance")
+    axis.minorticks_off()
     axis.set_ylim(None, 3 * max(tolerance, axis.get_ylim()[1]))
     axis.set_xlabel("time, s")
     axis.set_ylabel(label)
@@ -175,6 +181,7 @@ def heat_map(
     axis.grid(visible=False)
     bar = axis.figure.colorbar(image, ax=axis, pad=0.03, fraction=0.06)
     bar.ax.tick_params(labelsize=7)
+    bar.ax.minorticks_off()
     bar.outline.set_linewidth(0.5)
 
 

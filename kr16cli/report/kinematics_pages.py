@@ -218,8 +218,8 @@ def workspace(document: Document, content: Content) -> None:
             )  # fmt: skip
         top = by_name["wrist_height"]["value"] / 1e3
         axis.axhline(top, color="#555555", lw=0.8, ls=":")
-        axis.annotate(f"wrist height {by_name['wrist_height']['value']:g}", (1.75, top), (0, 3),
-                      textcoords="offset points", fontsize=8, ha="right")  # fmt: skip
+        axis.annotate(f"wrist height {by_name['wrist_height']['value']:g}", (-0.95, top), (0, 3),
+                      textcoords="offset points", fontsize=8)  # fmt: skip
     axis.set_ylim(-0.45, 2.2)
     axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3, handlelength=3.2)
     page.caption(

@@ -230,9 +230,10 @@ class Document:
         """The page if it has room for so many points, else a new one."""
         return page if page.room >= points else self.page(f"{title} (continued)")
 
-    def adopt(self, figure: Figure) -> None:
-        """Take a figure made elsewhere as a page; it leaves the bottom 60 points free."""
+    def adopt(self, figure: Figure, title: str) -> None:
+        """Take a figure made elsewhere as a page; it leaves room for title and footer."""
         self.pages.append(Page(figure))
+        self.pages[-1].title(title)
 
     def finish(self) -> list[Figure]:
         """Write the footers; the figures in order."""

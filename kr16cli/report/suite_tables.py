@@ -38,11 +38,13 @@ def headline(results: Sequence[Result], holds: str, subject: str) -> str:
 
 def claims(document: Document, page: Page, title: str, results: Sequence[Result]) -> Page:
     """What each case claims, and how well it holds; failures explained below."""
-    rows: list[list[str | Cell]] = [
-        [r.title, r.regime, r.grade, f"{r.samples:,}" if r.samples else "-", measured(r),
-         status_cell(r)]
-        for r in results
-    ]  # fmt: skip
+    rows: list[list[str | Cell]] = []
+    before = ""
+    for r in results:
+        regime = "as above" if r.regime == before and len(before) > 24 else r.regime
+        before = r.regime
+        count = f"{r.samples:,}" if r.samples else "-"
+        rows.append([r.title, regime, r.grade, count, measured(r), status_cell(r)])
     page, _ = table(document, page, title, _CLAIMS, rows, size=7.2)
     for r in results:
         if r.status == "failed":

@@ -1,5 +1,5 @@
 """Suite `dynamics`: mass, Coriolis and gravity terms, energies, loads, drives, task space."""
 
-from kr16cli.verify.suites.dynamics import exactly, identities, lagrange, loads, task
+from kr16cli.verify.suites.dynamics import exactly, identities, lagrange, loads, moments, task
 
-__all__ = ["exactly", "identities", "lagrange", "loads", "task"]
+__all__ = ["exactly", "identities", "lagrange", "loads", "moments", "task"]

@@ -1,5 +1,5 @@
 """Suite `inverse`: inverse kinematics: closure, completeness, branches, singular cases."""
 
-from kr16cli.verify.suites.inverse import closure, completeness, singular
+from kr16cli.verify.suites.inverse import closure, completeness, edges, singular
 
-__all__ = ["closure", "completeness", "singular"]
+__all__ = ["closure", "completeness", "edges", "singular"]
