@@ -234,6 +234,20 @@ def test_a_failed_case_is_red_and_says_so_in_words() -> None:
     assert _red(_figures("kinematics")[0]) == 0
 
 
+def test_an_unproved_verdict_on_the_chapter_is_not_hidden() -> None:
+    rows = [dataclasses.replace(r) for r in _results() if r.id == "chapter.wrist"]
+    equations = [dict(e) for e in rows[0].figures["equations"]]
+    wrong = next(e for e in equations if e["verdict"] == "misprint")
+    wrong["proved"] = False
+    bad = dataclasses.replace(rows[0], figures={"equations": equations})
+    words = _said(_content(results=(bad,)))
+    text = "\n".join(words)
+    assert "1 verdicts are NOT PROVED" in text
+    assert "FAILED: 1 of" in text
+    assert "NOT PROVED" in words
+    assert "Every verdict is proved" not in text
+
+
 def test_a_case_that_raised_leads_the_list_of_margins() -> None:
     bad = dataclasses.replace(_results()[0], status="failed", error=None, evidence="ValueError: x")
     words = _said(_content("kinematics", (*_results()[1:], bad)))

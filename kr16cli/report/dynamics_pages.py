@@ -33,7 +33,7 @@ def dynamics(document: Document, content: Content) -> None:
 def mass_centres(document: Document, content: Content) -> None:
     """Figure 3.3: mass centres of the chapter's arm and of the robot."""
     drawing = content.drawing("mass_centres")
-    page = document.page("Mass centres lie on the chapter's lines only in the chapter's arm")
+    page = document.page("Mass centres of the chapter's arm, and of the robot (figure 3.3)")
     gap = 48.0
     wide = (FULL - 34 - gap) / 2
     for row, (up, label) in enumerate(((2, "z, m"), (1, "y, m"))):
@@ -74,11 +74,12 @@ def torques(document: Document, content: Content) -> None:
     page = document.page(title)
     axis = page.axes(190, above=30)
     figures.torque_curves(axis, d["time"], d["tau"], d["limit"], d["names"])
+    status = ", ".join(sorted({j.provenance.of("torque_nm").status for j in content.data.joints}))
     start, end = (", ".join(f"{v:g}" for v in d[k]) for k in ("start_deg", "end_deg"))
     page.caption(
         f"From A = ({start}) to ({end}) deg in {d['time'][-1]:g} s along a quintic, with "
         f"{d['payload_kg']:g} kg at {', '.join(f'{v:g}' for v in d['com_mm'])} mm of the flange, "
-        "rotor inertia and friction counted; marks: the largest. Limits are those of a sibling arm."
+        f"rotor inertia and friction counted; marks: the largest. Status of the limits: {status}."
     )
     half = FULL / 2
     bars = page.axes(170, LEFT + 26, LEFT + half - 22, move=False)
@@ -92,7 +93,10 @@ def torques(document: Document, content: Content) -> None:
         "Holding torque: largest |G| / limit",
     )  # fmt: skip
     page.y += 12
-    page.caption("Map: other joints at 0, the same load, over the ranges of A2 and A3; n = 3,721.")
+    page.caption(
+        "Map: other joints at 0, the same load, over the ranges of A2 and A3; n = "
+        f"{d['gravity_share'].size:,}."
+    )
 
 
 def orders(document: Document, content: Content) -> None:

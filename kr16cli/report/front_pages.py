@@ -110,10 +110,13 @@ def _misprints(content: Content) -> str:
     if not rows:
         return ""
     wrong = sum(e["verdict"] == "misprint" for e in rows)
+    unproved = sum(not e["proved"] for e in rows)
+    proved = "Every verdict is proved, and the model agrees with each corrected form."
+    if unproved:
+        proved = f"{unproved} verdicts are NOT PROVED; see the pages on the chapter."
     return (
         f"The chapter this tool implements was audited statement by statement: {len(rows)} "
-        f"statements, {wrong} of them misprints. Each misprint has a proved correction, and the "
-        "model follows the corrected form."
+        f"statements, {wrong} of them misprints. {proved}"
     )
 
 

@@ -167,7 +167,7 @@ def rpy_scipy(setting: Setting) -> Finding:
 def pose_distance(setting: Setting) -> Finding:
     """The measure that IK is judged by."""
     rng, robot = sampling.random(setting, "pose-distance"), setting.robot.with_tool(None)
-    n = setting.samples(1000, 100)
+    n = setting.samples(1000, 500)
     q = sampling.generic(rng, n)
     poses = robot.fk(q)
     angle = 10.0 ** rng.uniform(-12, math.log10(3.14), n)
