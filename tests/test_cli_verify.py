@@ -309,3 +309,10 @@ def test_unusable_recordings_are_one_line(tmp_path: Path) -> None:
     file.write_text("a1,a2,a3,a4,a5,a6\n1,2,3,4,5,6\n", encoding="utf-8")
     complains(kr16("verify", "poses", file), "row 1", "x, y, z")
     complains(kr16("verify", "poses", tmp_path / "none.csv"), "none.csv", "cannot be read")
+
+
+def test_figures_travel_with_the_results_when_asked() -> None:
+    bare = kr16("verify --suite velocity --quick --json").result()["cases"]
+    full = kr16("verify --suite velocity --quick --json --figures").result()["cases"]
+    assert not any("figures" in one for one in bare)
+    assert any(one["figures"] for one in full)

@@ -37,6 +37,9 @@ SelfTest = Annotated[
     bool,
     typer.Option("--self-test", help="Seed faults in the model: does a case see each of them?"),
 ]
+Figures = Annotated[
+    bool, typer.Option("--figures", help="With --json: what reports draw, for kr16 report --from.")
+]
 UrdfFile = Annotated[str, typer.Argument(metavar="FILE.urdf", help="A URDF of this arm.")]
 PoseFile = Annotated[
     str,
@@ -230,6 +233,7 @@ class _Targets:
         self._stack = ExitStack()
         self._main, self._file = out.Target(output), _parameter(ctx, "junit")
         self._junit = out.Target(self._file)
+        self._figures = bool(_parameter(ctx, "figures"))
 
     def __enter__(self) -> _Targets:
         self._stack.enter_context(self._main)
@@ -252,7 +256,11 @@ class _Targets:
 
         counts = text_of.counts(results)
         if self._kind == "json":
-            found = counts | {"cases": [text_of.entry(r) for r in results]} | dict(extra or {})
+            found = (
+                counts
+                | {"cases": [text_of.entry(r, figures=self._figures) for r in results]}
+                | dict(extra or {})
+            )
             envelope = {
                 "schema": "kr16.verify/1",
                 "robot": data.name,

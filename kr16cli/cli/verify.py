@@ -16,7 +16,8 @@ def verify(
     ctx: typer.Context, suite: checks.Suite = None, quick: checks.Quick = False,
     seed: checks.Seed = None, robot: o.Robot = None, format_: o.Format = None,
     json: o.Json = False, junit: checks.Junit = None, list_: checks.List = False,
-    output: o.Output = None, self_test: checks.SelfTest = False,
+    output: o.Output = None, figures: checks.Figures = False,
+    self_test: checks.SelfTest = False,
 ) -> None:  # fmt: skip
     """Verify the model: every case with its tolerance, worst case and grade of independence.
 

@@ -17,9 +17,10 @@ def counts(results: Sequence[Result]) -> dict[str, int]:
     }
 
 
-def entry(result: Result) -> dict[str, Any]:
-    """One of `result.cases`; figures for drawings are left out."""
-    return {
+def entry(result: Result, *, figures: bool = False) -> dict[str, Any]:
+    """One of `result.cases`; with `figures`, the numbers that a report draws too."""
+    drawn = {"figures": plain(result.figures)} if figures else {}
+    return drawn | {
         "id": result.id,
         "group": result.group,
         "title": result.title,
