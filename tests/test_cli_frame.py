@@ -299,7 +299,14 @@ def test_interrupted_batch_leaves_nothing_behind(
     rows = "0,-90,90,0,10,0\n" * 200_000
     (tmp_path / "q.csv").write_text("a1,a2,a3,a4,a5,a6\n" + rows)
     command = [sys.executable, "-m", "kr16cli", "fk", "--input", "q.csv", "-o", "out.csv"]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+    # A parent in the background ignores SIGINT, and its children would inherit that.
+    with subprocess.Popen(
+        command,
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:
         until = time.monotonic() + 30
         while len(list(tmp_path.iterdir())) < 2 and time.monotonic() < until:
             time.sleep(0.02)  # until the temporary file is there

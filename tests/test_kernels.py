@@ -290,7 +290,7 @@ def test_every_kernel_has_room_and_a_name() -> None:
 @pytest.mark.parametrize(
     ("engine", "code"), [("numpy", 0), ("native", 0 if has_native() else 4), ("abacus", 2)]
 )
-def test_environment_forces_an_engine(engine: str, code: int) -> None:
+def test_environment_forces_an_engine(engine: str, code: int, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "kr16cli", "info", "--json"],
         env={
@@ -298,6 +298,7 @@ def test_environment_forces_an_engine(engine: str, code: int) -> None:
             "KR16_ENGINE": engine,
             "PYTHONPATH": str(Path(kr16cli.__file__).parents[1]),
         },
+        cwd=tmp_path,  # a checkout here would hide the installed package and its kernels
         capture_output=True,
         text=True,
         check=False,
