@@ -109,12 +109,10 @@ class KR16(Fmi2Slave):
         self._try(self._write, vrs, values, "String")
 
     def _read(self, vrs: Sequence[int], bases: Sequence[str], kind: type) -> list[Any]:
-        self._machine.must_be_of(vrs, bases)
-        return [kind(v) for v in self._machine.get(vrs)]
+        return list(map(kind, self._machine.get(vrs, bases)))
 
     def _write(self, vrs: Sequence[int], values: Sequence[Any], base: str) -> None:
-        self._machine.must_be_of(vrs, (base,))
-        self._machine.set(vrs, values)
+        self._machine.set(vrs, values, (base,))
 
     def _get_fmu_state(self) -> dict[str, Any]:
         return self._try(self._machine.save)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,9 +21,12 @@ from kr16cli.kinematics import Kinematics, Like, pose_rows
 from kr16cli.model import dynamics, orientation, task
 from kr16cli.model.posture import status, turn
 from kr16cli.model.scalars import Scalar
-from kr16cli.robot import Inertia6, Payload, Vector3
+from kr16cli.robot import Inertia6, Payload, RobotData, Vector3
 from kr16cli.robot_file import load_data, parse_data
 from kr16cli.robot_rules import checked_payload
+
+if TYPE_CHECKING:
+    from kr16cli.kernels.native_engine import NativeKernels
 
 
 def load_robot(
@@ -43,6 +46,30 @@ def load_robot(
     return Robot(load_data(path), payload=payload, drives=drives, tool=tool)
 
 
+class EquationOfMotion(NamedTuple):
+    """M qdd + C qd + G = tau: M, C (..., 6, 6) in kg m2 and kg m2/s, G (..., 6) in N m."""
+
+    mass_matrix: Array
+    coriolis_matrix: Array
+    gravity: Array
+
+
+class InverseDynamicsDerivatives(NamedTuple):
+    """Change of torque i with joint value j, (..., 6, 6) each: N m/rad, N m s/rad, kg m2."""
+
+    dtau_dq: Array
+    dtau_dqd: Array
+    dtau_dqdd: Array
+
+
+class ForwardDynamicsDerivatives(NamedTuple):
+    """Change of acceleration i with joint value j, (..., 6, 6) each: 1/s2, 1/s, 1/(kg m2)."""
+
+    dqdd_dq: Array
+    dqdd_dqd: Array
+    dqdd_dtau: Array
+
+
 class TaskSpaceArrays(NamedTuple):
     """Task-space dynamics: Mx, Cx (..., 6, 6), Gx (..., 6), analytic Jacobian and its rate."""
 
@@ -58,6 +85,30 @@ class Robot(Kinematics):
 
     Arguments as in `Kinematics`; get one from `load_robot` or `Robot.from_parameters`.
     """
+
+    def __init__(
+        self,
+        data: RobotData,
+        *,
+        payload: Payload | None = None,
+        drives: bool = False,
+        tool: Like | None = None,
+    ) -> None:
+        super().__init__(data, payload=payload, drives=drives, tool=tool)
+        if self._native is not None and type(self) is Robot:
+            self._answer_directly(self._native)
+
+    def _answer_directly(self, kernels: NativeKernels) -> None:
+        """Put compiled callables before those methods that a kernel answers as they are."""
+        from kr16cli.kernels.native_engine import ARM_METHODS, DYNAMIC_METHODS
+
+        direct = ARM_METHODS if self.tool is None else {}
+        for name, required in {**direct, **(DYNAMIC_METHODS if self.data.links else {})}.items():
+            setattr(self, name, kernels.method(name, required, getattr(self, name)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled by what it was made of; the kernels are bound anew."""
+        return _remade, (self.data, self.payload, self.drives, self.tool)
 
     @classmethod
     def from_parameters(cls, table: Mapping[str, Any], **options: Any) -> Robot:
@@ -125,6 +176,22 @@ class Robot(Kinematics):
         """G(q) of (3.42), (..., 6), N m."""
         return self._dynamic("gravity", (q,), out, threads)
 
+    def bias(self, q: Like, qd: Like, *, out: Array | None = None, threads: int = 1) -> Array:
+        """C qd + G (+ friction with drives), (..., 6), N m: `inverse_dynamics` at qdd = 0."""
+        return self._dynamic("bias", (q, qd), out, threads)
+
+    def equation_of_motion(
+        self, q: Like, qd: Like, *, out: Array | None = None, threads: int = 1
+    ) -> EquationOfMotion:
+        """M, C and G of M qdd + C qd + G = tau in one pass, cheaper than one by one.
+
+        They are views of one array (..., 78), row after row: `out` where given.
+        """
+        table = self._dynamic("equation", (q, qd), out, threads)
+        square = (*table.shape[:-1], 6, 6)
+        M, C = table[..., :36].reshape(square), table[..., 36:72].reshape(square)
+        return EquationOfMotion(M, C, table[..., 72:])
+
     def friction(self, qd: Like) -> Array:
         """Friction torque against qd, (..., 6), N m: 0 without drives, else regularised."""
         rates = arrays.checked("qd", qd, 6)
@@ -145,6 +212,29 @@ class Robot(Kinematics):
     ) -> Array:
         """Accelerations qdd for torques tau, (..., 6), rad/s2."""
         return self._dynamic("forward_dynamics", (q, qd, tau), out, threads)
+
+    def inverse_dynamics_derivatives(
+        self, q: Like, qd: Like, qdd: Like, *, out: Array | None = None, threads: int = 1
+    ) -> InverseDynamicsDerivatives:
+        """Exact derivatives of `inverse_dynamics` with respect to q, qd and qdd.
+
+        d tau / d qd = 2 C (+ the slope of friction with drives), d tau / d qdd = M with rotors;
+        d tau / d q in closed form (`model.derivatives`). They are views of one array
+        (..., 3, 6, 6): `out` where given.
+        """
+        table = self._dynamic("inverse_dynamics_derivatives", (q, qd, qdd), out, threads)
+        return InverseDynamicsDerivatives(*_three(table))
+
+    def forward_dynamics_derivatives(
+        self, q: Like, qd: Like, tau: Like, *, out: Array | None = None, threads: int = 1
+    ) -> ForwardDynamicsDerivatives:
+        """Exact derivatives of `forward_dynamics` with respect to q, qd and tau.
+
+        d qdd = M^-1 (d tau - d inverse dynamics), so d qdd / d tau = M^-1. They are views of one
+        array (..., 3, 6, 6): `out` where given.
+        """
+        table = self._dynamic("forward_dynamics_derivatives", (q, qd, tau), out, threads)
+        return ForwardDynamicsDerivatives(*_three(table))
 
     def energy(self, q: Like, qd: Like, *, threads: int = 1) -> tuple[Array, Array]:
         """(kinetic, potential) energy, J, each (...); potential zero at robroot's origin."""
@@ -203,11 +293,13 @@ class Robot(Kinematics):
     def status_turn(self, q: Like) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
         """KUKA's Status and Turn of configurations (..., 6), computed by rule, each (...)."""
         angles = arrays.checked("q", q, 6)
-        rows = angles.reshape(-1, 6).tolist()
-        shape = angles.shape[:-1]
-        s = np.array([status(row, self.data.geometry) for row in rows], dtype=np.int64)
-        t = np.array([turn(row) for row in rows], dtype=np.int64)
-        return s.reshape(shape), t.reshape(shape)
+        columns = [angles[..., i] for i in range(6)]
+        s = np.asarray(status(columns, self.data.geometry, ARRAYS), dtype=np.int64)
+        return s, np.asarray(turn(columns), dtype=np.int64)
+
+
+def _remade(data: RobotData, payload: Payload | None, drives: bool, tool: Like | None) -> Robot:
+    return Robot(data, payload=payload, drives=drives, tool=tool)
 
 
 def _inverses(matrices: Array) -> npt.NDArray[np.floating[Any]]:
@@ -216,6 +308,13 @@ def _inverses(matrices: Array) -> npt.NDArray[np.floating[Any]]:
     regular = whole & (np.linalg.det(np.where(whole[..., None, None], matrices, 0.0)) != 0.0)
     safe = np.where(regular[..., None, None], matrices, np.eye(matrices.shape[-1]))
     return np.where(regular[..., None, None], np.linalg.inv(safe), np.nan)
+
+
+def _three(table: Array) -> tuple[Array, Array, Array]:
+    """The three matrices of (..., 3, 6, 6), without the ellipsis where that is quicker."""
+    if table.ndim == 3:
+        return table[0], table[1], table[2]
+    return table[..., 0, :, :], table[..., 1, :, :], table[..., 2, :, :]
 
 
 def _vector(values: npt.NDArray[np.floating[Any]]) -> list[Scalar]:

@@ -105,3 +105,10 @@ def checked_threads(threads: object) -> int:
     if not isinstance(threads, (int, np.integer)) or isinstance(threads, bool) or threads < 1:
         raise InputError(f"threads is {threads!r}; expected a whole number of 1 or more")
     return int(threads)
+
+
+def ranges(ends: Sequence[tuple[float, float]]) -> Array:
+    """Middles in [-pi, pi], then half widths, of angular ranges (lower, upper) in rad: (2 n,)."""
+    table = np.array(ends)
+    middle = np.remainder(table.mean(axis=1) + np.pi, 2 * np.pi) - np.pi
+    return np.concatenate([middle, (table[:, 1] - table[:, 0]) / 2])

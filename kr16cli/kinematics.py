@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -20,13 +20,16 @@ from kr16cli.errors import InputError, NoAnswerError, ShapeError
 from kr16cli.kernels import engine_name
 from kr16cli.kernels.columns import ARRAYS, ColumnEngine
 from kr16cli.kernels.parameters import Parameters, parameters
-from kr16cli.kernels.quantities import ANGLES, QUANTITIES, Quantity
+from kr16cli.kernels.quantities import ANGLES, QUANTITIES, WIDTH, Quantity
 from kr16cli.kernels.quantities import flat as flatten
 from kr16cli.model import orientation
 from kr16cli.model.scalars import FLOATS, Functions, Scalar
 from kr16cli.model.view import Axes, View
 from kr16cli.robot import Payload, RobotData
 from kr16cli.single import Arm
+
+if TYPE_CHECKING:
+    from kr16cli.kernels.native_engine import NativeKernels
 
 Like = npt.ArrayLike
 
@@ -84,7 +87,7 @@ class Kinematics:
         self.data, self.payload, self.drives = data, payload, drives
         self.arm = Arm(data, payload=payload, drives=drives)
         self._columns = ColumnEngine()
-        self._native: Mapping[str, Any] | None = None
+        self._native: NativeKernels | None = None
         if engine_name() == "native":
             from kr16cli.kernels.native_engine import NativeKernels
 
@@ -113,8 +116,11 @@ class Kinematics:
     ) -> Array:
         """The same after checks and conversions, on floats for one configuration."""
         quantity = QUANTITIES[name]
-        known = {n: v for n, v in zip(quantity.inputs, inputs, strict=True) if v is not None}
-        values = {n: self._checked(n, v) for n, v in known.items()}
+        values = {
+            n: self._checked(n, v)
+            for n, v in zip(quantity.inputs, inputs, strict=True)
+            if v is not None or n != "near"
+        }
         ranks = [2 if n == "T" else 1 for n in values]
         lead = arrays.batch(list(values), list(values.values()), ranks)
         target = arrays.result(out, lead + quantity.shape)
@@ -126,10 +132,10 @@ class Kinematics:
         self._fill(name, flat, target, len(lead), threads)
         return target
 
-    def _checked(self, name: str, value: Like) -> Array:
+    def _checked(self, name: str, value: Any) -> Array:
         if name == "T":
             return self._poses(name, value)
-        return arrays.checked(name, value, 6)
+        return arrays.checked(name, value, WIDTH.get(name, 6))
 
     def _one(self, name: str, *inputs: Any) -> npt.ArrayLike:
         """A quantity for one configuration of lists of floats; `single.Arm` by name."""
@@ -151,18 +157,20 @@ class Kinematics:
         """Fill `target`, whose first `lead` axes are the batch, from flat inputs (n, k)."""
         quantity = QUANTITIES[name]
         n = int(np.prod(target.shape[:lead], dtype=int))
-        table = target if target.flags.c_contiguous else np.empty(target.shape)
-        table = table.reshape(n, -1 if n else int(np.prod(quantity.shape)))
         inputs = [flat.get(i) for i in quantity.inputs]
+        apart = not any(np.may_share_memory(v, target) for v in flat.values())
+        direct = target.flags.carray and apart
+        table = target if direct else np.empty(target.shape)
+        table = table.reshape(n, -1 if n else int(np.prod(quantity.shape)))
         if self._native is not None and n:
-            clean = [None if v is None else np.ascontiguousarray(v) for v in inputs]
+            clean = [None if v is None else np.require(v, requirements=["C", "A"]) for v in inputs]
             if quantity.inputs[0] == "T" and clean[0] is not None:
                 clean[0] = clean[0].reshape(n, 4, 4)
             if self._native[name](*clean, table.reshape(n, *quantity.shape), threads) is None:
                 raise RuntimeError(f"the kernel {name} refused checked input")
         else:
             self._columns.run(quantity, self._numbers, inputs, table, threads)
-        if not np.shares_memory(table, target):
+        if not direct:
             target[...] = table.reshape(target.shape)
 
     # Kinematics -----------------------------------------------------------------------------
@@ -211,6 +219,24 @@ class Kinematics:
         if self.tool is not None:
             T = self._flange_poses(T)
         return self._ask("ik", (T, near), out, threads)
+
+    def judge_branches(self, T: Like, *, out: Array | None = None, threads: int = 1) -> Array:
+        """What the eight branches of poses (..., 4, 4) are worth, (..., 6); `model.branches`.
+
+        Solutions in reach, solutions within the joint limits; largest and smallest |det J| of
+        those (m3); the best one's distance to its nearest limit (rad, negative outside, -1e9
+        out of reach) and from the singularities (0 to 1).
+        """
+        if self.tool is not None:
+            T = self._flange_poses(T)
+        lead = np.shape(T)[:-2]
+        few = len(lead) == 1 and lead[0] <= len(self._ranges)
+        rows = self._ranges[: lead[0]] if few else np.broadcast_to(self._ranges[0], (*lead, 12))
+        return self._ask("branches", (T, np.ascontiguousarray(rows)), out, threads)
+
+    @cached_property
+    def _ranges(self) -> Array:
+        return np.tile(arrays.ranges([(j.lower, j.upper) for j in self.data.joints]), (4096, 1))
 
     def ik_path(self, T: Like, near: Like | None = None) -> Array:
         """One configuration per pose of a path (n, 4, 4): (n, 6), each nearest to the one before.

@@ -50,8 +50,8 @@ __all__ = [
 Matrix = list[list[float]]
 Limits = Sequence[tuple[float, float]]
 
-# Joints whose range exceeds one turn on arms of this structure.
-_TURNING_JOINTS = (0, 3, 5)
+TURNING_JOINTS = (0, 3, 5)
+"""Joints whose range exceeds one turn on arms of this structure."""
 
 
 def abc_from_matrix(R: Sequence[Sequence[float]]) -> tuple[float, float, float]:
@@ -106,7 +106,7 @@ def pose_from_matrix(T: Sequence[Sequence[float]], *, si: bool = False) -> list[
 
 def near_turn_switch(q: Sequence[float]) -> list[int]:
     """Joints (0 to 5) of A1, A4, A6 within 2 deg of 0 but not at it, where T may be ignored."""
-    return [i for i in _TURNING_JOINTS if TOLERANCES.sign < abs(q[i]) < TOLERANCES.turn_switch]
+    return [i for i in TURNING_JOINTS if TOLERANCES.sign < abs(q[i]) < TOLERANCES.turn_switch]
 
 
 def full_turn_variants(q: Sequence[float], limits: Limits) -> list[list[float]]:
@@ -123,7 +123,7 @@ def full_turn_variants(q: Sequence[float], limits: Limits) -> list[list[float]]:
     choices: list[list[tuple[int, float]]] = []
     for i, (angle, (lower, upper)) in enumerate(zip(q, limits, strict=True)):
         options = [(0, angle)]
-        if i in _TURNING_JOINTS:
+        if i in TURNING_JOINTS:
             first = math.ceil((lower - TOLERANCES.limit - angle) / math.tau)
             last = math.floor((upper + TOLERANCES.limit - angle) / math.tau)
             inside = [(abs(k), angle + k * math.tau) for k in range(first, last + 1)]

@@ -28,17 +28,29 @@ class Geometry(NamedTuple):
     d6: float
 
 
+class Tolerance(NamedTuple):
+    """How far a number may be off: `relative`, or `absolute` in the number's SI unit; one is None.
+
+    It is the half width of an interval that holds the number with about 95 %.
+    """
+
+    relative: float | None = None
+    absolute: float | None = None
+
+
 @dataclass(frozen=True)
 class Provenance:
     """Where a group of numbers comes from: a status, source keys and notes by key.
 
-    `notes` holds the texts and `overrides` the own status and source of single keys.
+    `notes` holds the texts, `overrides` the own status and source and `tolerances` the own
+    tolerance of single keys.
     """
 
     status: Status
     source: tuple[str, ...]
     notes: Mapping[str, str] = field(default_factory=dict)
     overrides: Mapping[str, Provenance] = field(default_factory=dict)
+    tolerances: Mapping[str, Tolerance] = field(default_factory=dict)
 
     def of(self, key: str) -> Provenance:
         """Provenance of one key of the group, such as "d6": its own, else the group's."""
@@ -67,7 +79,9 @@ class JointData:
     @property
     def reflected_inertia(self) -> float:
         """Rotor inertia seen at the joint, J G^2 in kg m2; 0 where the file is silent."""
-        return (self.rotor_inertia or 0.0) * (self.gear_ratio or 0.0) ** 2
+        if self.rotor_inertia is None or self.gear_ratio is None:
+            return 0.0
+        return self.rotor_inertia * self.gear_ratio**2
 
 
 @dataclass(frozen=True)
@@ -120,7 +134,7 @@ class RobotData:
 
     @cached_property
     def sha256(self) -> str:
-        """SHA-256 of the numbers and names; comments, order, sources and statuses do not count.
+        """SHA-256 of the numbers and names; comments, order, sources, statuses, notes do not count.
 
         Of canonical JSON: sorted keys, no spaces, floats in Python's shortest exact form.
         """

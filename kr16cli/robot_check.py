@@ -21,6 +21,7 @@ from kr16cli.robot_rules import (
     LENGTH,
     LIMITS,
     LINK,
+    NOTE,
     RATINGS,
     Quantity,
     inertia_problem,
@@ -36,7 +37,7 @@ FRAMES = ("zero-pose", "dh")
 _RADIAN_LIMIT = 2.0 * math.pi
 _RADIAN_SPEED = 15.0
 _CONFLICT_KEYS = ("key", "values", "chosen", "reason", "source")
-_NOTE_KEYS = ("status", "source", "text")
+_NOTE_KEYS = ("status", "source", "text", *NOTE)
 # Longest text of a value, and most keys, in one message.
 _SHOWN = 80
 _LISTED = 8
@@ -258,10 +259,14 @@ class Checker:
             note = notes[key]
             self.keys(note, where, (), _NOTE_KEYS)
             if not note:
-                self.fail(where, note, "a note must hold a status, a source or a text")
+                self.fail(where, note, "a note must hold a status, a source, a text or a tolerance")
             self.choice(note, where, "status", STATUSES)
             self.sources(note, where)
             self.text(note, where, "text")
+            for quantity_key, quantity in NOTE.items():
+                self.number(note, where, quantity_key, quantity)
+            if all(kind in note for kind in NOTE):
+                self.fail(where, note["plus_minus"], "stands beside tolerance; give one")
 
     def conflict(self, table: Mapping[str, Any], conflict: Mapping[str, Any], at: str) -> None:
         """Check one conflict between sources."""

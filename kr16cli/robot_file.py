@@ -20,6 +20,7 @@ from kr16cli.robot import (
     LinkData,
     Provenance,
     RobotData,
+    Tolerance,
     Vector3,
 )
 from kr16cli.robot_check import problems_in
@@ -157,7 +158,17 @@ def _provenance(group: Mapping[str, Any]) -> Provenance:
             for key, note in notes.items()
             if "status" in note or "source" in note
         },
+        tolerances={
+            key: Tolerance(note.get("tolerance"), _in_si(key, note.get("plus_minus")))
+            for key, note in notes.items()
+            if "tolerance" in note or "plus_minus" in note
+        },
     )
+
+
+def _in_si(key: str, value: float | None) -> float | None:
+    """A number of a note in the SI unit of its key."""
+    return rad(value) if value is not None and "_deg" in key else value
 
 
 def _joint(joint: Mapping[str, Any]) -> JointData:

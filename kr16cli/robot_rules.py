@@ -68,6 +68,11 @@ MASS = _positive("masses", "kg", 10_000.0, "g")
 INERTIA = Quantity("inertias", "kg m2", 100_000.0, "kg mm2")
 GRAVITY = Quantity("accelerations", "m/s2", 100.0, "mm/s2")
 LINK = {"mass": MASS, "tolerance": Quantity("relative tolerances", "", 1.0, "percent", low=0.0)}
+NOTE = {
+    "tolerance": Quantity("relative tolerances", "", 1.0, "percent", low=0.0),
+    "plus_minus": Quantity("tolerances", "", low=0.0),
+}
+"""Numbers of a note: how far the key may be off, relative or in its own unit."""
 _RATING_UNITS = {
     "kg": ("payload", "mass", "supplementary_load_arm", "supplementary_load_column", "total_load"),
     "mm": (

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import math
+import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -11,16 +14,21 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
+import pytest
 from fmpy import fmi2
 
 import kr16cli
-from kr16cli.fmi import build, choices, shim
+from kr16cli.fmi import build, choices, compiling
 from kr16cli.fmi.variables import Part, Start
 
 BENT = tuple(map(math.radians, (0.0, -60.0, 60.0, 0.0, 30.0, 0.0)))
 Q = [f"q[{i}]" for i in range(1, 7)]
 QD = [f"qd[{i}]" for i in range(1, 7)]
 TAU = [f"tau[{i}]" for i in range(1, 7)]
+TESTS = Path(__file__).resolve().parent
+SHIM = [False, pytest.param(True, marks=pytest.mark.skipif(
+    compiling.find_compiler() is None, reason="no C compiler for the shim"))]  # fmt: skip
+"""Without and with the parts in C."""
 
 
 @lru_cache
@@ -28,7 +36,7 @@ def content(
     start: Start | None = None, part: Part = Part.ROBOT, *, with_shim: bool = False
 ) -> bytes:
     """An FMU of the KR 16-2."""
-    compiler = shim.find_compiler() if with_shim else None
+    compiler = compiling.find_compiler() if with_shim else None
     options, _ = choices.options(kr16cli.load_data(), None, part, compiler)
     return build.build(kr16cli.load_data(), options._replace(start=start or options.start))
 
@@ -37,13 +45,10 @@ def content(
 def file(start: Start | None = None, part: Part = Part.ROBOT, *, with_shim: bool = False) -> Path:
     """The same as a file that lives as long as the tests."""
     folder = tempfile.TemporaryDirectory(prefix="kr16_tests_")
-    _KEPT.append(folder)
+    atexit.register(folder.cleanup)
     path = Path(folder.name) / "KR16.fmu"
     path.write_bytes(content(start, part, with_shim=with_shim))
     return path
-
-
-_KEPT: list[tempfile.TemporaryDirectory[str]] = []
 
 
 class Host:
@@ -115,3 +120,14 @@ def hosted(path: Path, folder: str | None = None) -> Iterator[Host]:
         yield host
     finally:
         host.free()
+
+
+def isolated(code: str, *arguments: object) -> str:
+    """What code prints in a process of its own; a crash of the FMU would end only that."""
+    done = subprocess.run(
+        [sys.executable, "-X", "faulthandler", "-c", code, *map(str, arguments)],
+        capture_output=True, text=True, timeout=300, check=False,
+        env={"PYTHONPATH": f"{TESTS}:{TESTS.parent}", "PATH": "/usr/bin:/bin"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout

@@ -27,6 +27,13 @@ def test_every_quantity_has_its_figures_and_peers() -> None:
     for row in rows.values():
         assert all(row[key] > 0 for key in ("batch_ns", "threads_ns", "call_ns"))
     assert "Pinocchio, a loop" in rows["forward_dynamics"]["peers"]
+    figures = {f["what"]: f for f in answer["result"]["motions"]}
+    assert all(f["seconds"] > 0 for f in figures.values())
+    swings = [f for what, f in figures.items() if "SciPy" in what]
+    assert len(swings) == 2 and all("Pinocchio's ABA" in f["peers"] for f in swings)
+    assert any("doStep of 1 ms" in what for what in figures)
+    shown = report.table(answer)
+    assert all(what in shown for what in figures)
     assert rows["fk"]["ratio"] == min(rows["fk"]["peers"].values()) / rows["fk"]["batch_ns"]
 
 

@@ -18,7 +18,7 @@ from kr16cli.assets import asset
 from kr16cli.model import chain, coriolis, dynamics, forward, inverse, jacobian, orientation
 from kr16cli.verify import registry
 from kr16cli.verify.chapter import SECTIONS, Equation, audit, audit_section, bench, motion, to_json
-from kr16cli.verify.chapter.arm import Point
+from kr16cli.verify.chapter.arm import Point, flat, product, rate
 from kr16cli.verify.chapter.judge import judge
 from kr16cli.verify.chapter.language import angle, evaluate
 from kr16cli.verify.chapter.recipe import Recipe, placed
@@ -275,6 +275,30 @@ def test_degrees_are_counted() -> None:
     length = Degree(rest=1)
     assert (c * c * length + length * 3 - 1).bound == 2 * 2 + 1
     assert (1 / length + c).bound == 2 + 2
+
+
+def test_what_points_share_is_what_they_would_compute_alone() -> None:
+    p = bench.Bench(2, quick=True).exact[0]
+    turned = p.at(q4=(Fraction(3, 5), Fraction(4, 5)))
+    assert turned.frames == Point(turned.angles, p.values).frames
+    assert turned.frames[3] is p.frames[3]
+    assert turned.frames[4] != p.frames[4]
+    for moving in (p.along, *p.partials):
+        alone = Point(moving.angles, p.values)
+        for shared, own in zip(moving.frames, alone.frames, strict=True):
+            for a, b in zip(flat(shared), flat(own), strict=True):
+                assert rate(a) == rate(b)
+                assert (a.value if isinstance(a, Dual) else a) == (
+                    b.value if isinstance(b, Dual) else b
+                )
+
+
+def test_products_leave_out_structural_zeros_and_ones_and_nothing_else() -> None:
+    a: list[list[Any]] = [[0, 1, Fraction(2, 3)], [-1, 0, 5], [Fraction(1, 7), 3, 0]]
+    b: list[list[Any]] = [[1, Fraction(3, 2), 0], [0, 0, -2], [4, 1, Fraction(5, 9)]]
+    assert product(a, b) == [
+        [sum(a[i][k] * b[k][j] for k in range(3)) for j in range(3)] for i in range(3)
+    ]
 
 
 # Faults in the model ------------------------------------------------------------------------

@@ -292,7 +292,8 @@ def test_interrupt_leaves_what_was_there(folder: Path) -> None:
     assert process.poll() is None
     process.send_signal(signal.SIGINT)
     shown, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
+    # An interrupt that meets an import may end Python by the signal; a shell shows 130 for both.
+    assert process.returncode in (130, -signal.SIGINT), errors
     assert (shown, errors.strip()) == ("", "kr16: interrupted; nothing more was written")
     assert files(folder) == ["run.csv", "slow.toml"]
     assert (folder / "run.csv").read_text() == "before"

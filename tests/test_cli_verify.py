@@ -242,7 +242,12 @@ _BASE, _TOOL = (500.0, -200.0, 100.0, 30.0, 2.0, -1.0), (10.0, 20.0, 150.0, 15.0
 
 
 def _record(
-    file: Path, count: int = 25, noise_mm: float = 0.0, spoiled: tuple[int, ...] = ()
+    file: Path,
+    count: int = 25,
+    noise_mm: float = 0.0,
+    spoiled: tuple[int, ...] = (),
+    *,
+    si: bool = False,
 ) -> None:
     rng = np.random.default_rng(7)
     robot = kr16cli.load_robot()
@@ -256,7 +261,9 @@ def _record(
             pose = np.array(kuka.pose_from_matrix(T.tolist()))
             pose[:3] += rng.normal(scale=noise_mm, size=3) if noise_mm else 0.0
             pose[1] += 12.0 if i in spoiled else 0.0
-            writer.writerow([*np.degrees(angles).tolist(), *pose.tolist()])
+            if si:
+                pose = np.concatenate([pose[:3] / 1000.0, np.radians(pose[3:])])
+            writer.writerow([*(angles if si else np.degrees(angles)).tolist(), *pose.tolist()])
 
 
 def test_base_and_tool_come_back(
@@ -272,6 +279,37 @@ def test_base_and_tool_come_back(
     assert [result["tool"][k] for k in "xyzabc"] == pytest.approx(_TOOL, abs=1e-6)
     assert result["recorded"]["position_mm"] > 100.0
     assert max(row["position_mm"] for row in result["rows"]) < 1e-6
+
+
+def test_recordings_in_si_say_the_same_in_si(
+    tmp_path: Path, validator: jsonschema.Draft202012Validator
+) -> None:
+    edge, si = tmp_path / "edge.csv", tmp_path / "si.csv"
+    _record(edge, 30, 0.1, (5,))
+    _record(si, 30, 0.1, (5,), si=True)
+    shown = kr16("verify", "poses", edge, "--json").json()
+    done = kr16("verify", "poses", si, "--si", "--json")
+    assert done.code == 1
+    validator.validate(done.json())
+    there, here = shown["result"], done.json()["result"]
+    factors = [1000.0] * 3 + [np.degrees(1.0)] * 3
+    for frame in ("base", "tool"):
+        scaled = [here[frame][k] * f for k, f in zip("xyzabc", factors, strict=True)]
+        assert scaled == pytest.approx([there[frame][k] for k in "xyzabc"], abs=1e-4)
+        assert done.json()["units"][frame] == "m rad"
+        assert shown["units"][frame] == "mm deg"
+    for a, b in zip(there["rows"], here["rows"], strict=True):
+        assert b["position_m"] * 1000.0 == pytest.approx(a["position_mm"], abs=1e-4)
+        assert np.degrees(b["orientation_rad"]) == pytest.approx(a["orientation_deg"], abs=1e-4)
+        assert b["outlier"] == a["outlier"] == (a["row"] == 5)
+    judged = {c["id"]: (c["unit"], c["tolerance"]) for c in here["cases"]}
+    assert judged["poses.position"] == ("m", 0.001)
+    assert judged["poses.orientation"] == ("rad", pytest.approx(np.radians(0.1)))
+    assert "X m" in kr16("verify", "poses", si, "--si").out
+
+
+def test_the_shipped_recording_is_not_in_si() -> None:
+    complains(kr16("verify poses example_poses --si"), "mm and degrees", "leave out --si")
 
 
 def test_outliers_stand_out_of_noise(tmp_path: Path) -> None:

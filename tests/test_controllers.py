@@ -1,4 +1,4 @@
-"""Controllers, their sampling, and the plant's limits, wrench and stops."""
+"""Controllers, and the limits, wrench and stops of the plant."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from kr16cli.simulate.build import make_controller
 from kr16cli.simulate.controllers import ComputedTorque, GravityPD, gains
 from kr16cli.simulate.core import Setpoint, euler_step, rk4_step
 from kr16cli.simulate.experiment import simulate
-from kr16cli.simulate.loop import ClosedLoop, SampledLoop, Sampling
+from kr16cli.simulate.loop import ClosedLoop
 from kr16cli.simulate.motion_spec import ControllerSpec, ReferenceSpec
 from kr16cli.simulate.plant import FADE, Limits, Plant, Wrench
 from kr16cli.simulate.run import load_run
 from kr16cli.simulate.scenario import Scenario, SolverSpec, TorqueSpec
 from kr16cli.simulate.summary import summarise, warnings
-from kr16cli.simulate.task_control import TaskComputedTorque, orientation_error
+from kr16cli.simulate.task_control import TaskComputedTorque
 from kr16cli.simulate.torque import Constant
 from kr16cli.single import Arm
 
@@ -61,12 +61,6 @@ def test_joint_errors_die_out_as_designed(data: kr16cli.RobotData, damping: floa
 def test_friction_and_rotors_are_compensated(data: kr16cli.RobotData) -> None:
     found = evidence.joint_error_dynamics(data, drives=True)
     assert np.abs(found.found - found.expected).max() < 1e-7
-
-
-def test_task_errors_die_out_as_designed(data: kr16cli.RobotData) -> None:
-    found = evidence.task_error_dynamics(data, 12.0, 0.5)
-    assert np.abs(found.found - found.expected).max() < 1e-8
-    assert np.ptp(found.found, axis=0).min() > 0.01
 
 
 def test_every_joule_is_accounted_for(data: kr16cli.RobotData) -> None:
@@ -155,128 +149,6 @@ def test_zero_and_gravity_are_controllers_too(data: kr16cli.RobotData, arm: Arm)
     assert make_controller(ControllerSpec("zero"), arm, Q).torque(0.0, Q, Q, goal) == [0.0] * 6
     tau = make_controller(ControllerSpec("gravity"), arm, Q).torque(0.0, Q, Q, goal)
     assert tau == arm.gravity(Q)
-
-
-def test_orientation_error_is_singular_far_from_the_reference_only(arm: Arm) -> None:
-    """It does not care where the reference is: at B = +-90 deg of the flange, too."""
-    home = [math.radians(v) for v in (0, -90, 90, 0, 0, 0)]
-    assert abs(arm.fk(home)[2][0]) == pytest.approx(1.0)
-    target = Setpoint(arm, home).task(0.0)
-    zero = orientation_error(target.rotation, (0.1, 0.2, 0.3), target)
-    assert zero.angles == pytest.approx([0.0] * 3, abs=1e-12)
-    assert np.linalg.norm(zero.rates) == pytest.approx(np.linalg.norm((0.1, 0.2, 0.3)))
-    pitched = (np.array(target.rotation) @ [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]).tolist()
-    with pytest.raises(ArithmeticError, match="pitch of 90 deg, 90 deg is singular"):
-        orientation_error(pitched, (0.0,) * 3, target)
-
-
-def test_damping_sets_in_smoothly_and_bounds_the_joints(arm: Arm) -> None:
-    control = TaskComputedTorque(arm, *gains(10.0), near=0.1, strength=0.05)
-    free = TaskComputedTorque(arm, *gains(10.0), near=0.0)
-    at, largest = [], {True: 0.0, False: 0.0}
-    for q5 in (0.2, math.asin(0.1), 0.05, 1e-3, 1e-5):
-        q = [0.1, -1.1, 1.2, 0.3, q5, 0.2]
-        goal = Setpoint(arm, [v + 0.05 for v in q]).task(0.0)
-        at.append(control.damping(q))
-        for damped, c in ((True, control), (False, free)):
-            qdd = c.acceleration(q, [0.0] * 6, goal)
-            largest[damped] = max(largest[damped], *map(abs, qdd))
-    assert at[:2] == pytest.approx([0.0, 0.0], abs=1e-18)
-    assert 0.0 < at[2] < at[3] < at[4] < 0.05**2
-    assert largest[True] < 300.0
-    assert largest[False] > 1e4
-    on_it = [0.1, -1.1, 1.2, 0.3, 0.0, 0.2]
-    assert all(map(math.isfinite, control.torque(0.0, on_it, [0.1] * 6, Setpoint(arm, Q))))
-
-
-# Sampling -----------------------------------------------------------------------------------
-
-
-def sampled(data: kr16cli.RobotData, sampling: Sampling | None, **changes: object) -> float:
-    """Largest joint error (rad) of a PTP of 0.4 rad under computed torque."""
-    end = tuple(v + 0.4 for v in Q)
-    scenario = replace(
-        STILL, duration=1.0,
-        controller=ControllerSpec("computed_torque", frequency=10.0, sampling=sampling),
-        reference=ReferenceSpec("ptp", end=end, acceleration=(6.0,) * 6),
-    )  # fmt: skip
-    run = simulate(data, replace(scenario, **changes))  # type: ignore[arg-type]
-    assert run.failure is None and run.q_ref is not None
-    return float(np.abs(run.q - run.q_ref).max())
-
-
-def test_sampling_costs_accuracy_in_proportion(data: kr16cli.RobotData) -> None:
-    exact = sampled(data, None)
-    errors = [sampled(data, Sampling(p)) for p in (0.016, 0.008)]
-    assert exact < 1e-7
-    assert 1.7 < errors[0] / errors[1] < 2.3
-    late = sampled(data, Sampling(0.008, delay=0.008))
-    assert 2.0 < late / errors[1] < 4.0  # half a period becomes one and a half
-
-
-def test_quantised_angles_and_torques_leave_a_trace(data: kr16cli.RobotData) -> None:
-    fine = sampled(data, Sampling(0.008))
-    coarse = sampled(data, Sampling(0.008, resolution=2e-3))
-    assert coarse > fine + 5e-4
-
-
-class _Counter:
-    """Says how often it was asked; answers with the time."""
-
-    def __init__(self) -> None:
-        self.asked: list[float] = []
-
-    def torque(self, t: float, q: object, qd: object, reference: object) -> list[float]:
-        self.asked.append(t)
-        return [t + 0.04] * 6
-
-
-def test_torque_is_held_and_late(arm: Arm) -> None:
-    loop = SampledLoop(
-        _Counter(), Setpoint(arm, Q), Sampling(0.1, delay=0.05, torque_step=0.1), 0.35
-    )
-    assert loop.breaks == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35])
-    for t in loop.breaks:
-        loop.sample(t, Q, Q)
-    assert loop.controller.asked == pytest.approx([0.0, 0.1, 0.2, 0.3])  # type: ignore[attr-defined]
-    found = [loop(t, Q, Q)[0] for t in (0.0, 0.149, 0.151, 0.2, 0.251)]
-    assert found == pytest.approx([0.0, 0.0, 0.1, 0.1, 0.2])
-
-
-def test_delay_of_whole_periods_meets_the_instants_exactly(arm: Arm) -> None:
-    loop = SampledLoop(_Counter(), Setpoint(arm, Q), Sampling(0.1, delay=0.3), 1.0)
-    assert len(loop.breaks) == 14  # 11 instants, and 3 beyond the end
-    assert set(loop.instants) <= set(loop.breaks)
-
-
-def test_speeds_are_differences_of_the_angles_read(arm: Arm) -> None:
-    seen: list[Sequence[float]] = []
-
-    class _Spy:
-        def torque(
-            self, t: float, q: Sequence[float], qd: Sequence[float], reference: object
-        ) -> list[float]:
-            seen.append([q[0], qd[0]])
-            return [0.0] * 6
-
-    loop = SampledLoop(_Spy(), Setpoint(arm, Q), Sampling(0.1, resolution=0.01), 1.0)
-    for k in range(3):
-        loop.sample(0.1 * k, [0.026 * k] * 6, [0.26] * 6)
-    assert np.array(seen) == pytest.approx(np.array([[0.0, 0.26], [0.03, 0.3], [0.05, 0.2]]))
-
-
-def test_adaptive_and_fixed_steps_agree_between_samples(data: kr16cli.RobotData) -> None:
-    scenario = replace(
-        STILL, duration=0.1,
-        controller=ControllerSpec("computed_torque", sampling=Sampling(0.01, 0.004)),
-        reference=ReferenceSpec("ptp", end=tuple(v + 0.2 for v in Q)),
-    )  # fmt: skip
-    adaptive = simulate(data, replace(scenario, solver=SolverSpec("DOP853", 1e-8, 1e-10)))
-    fixed = simulate(data, replace(scenario, solver=SolverSpec("RK4", step=0.002)))
-    assert np.abs(adaptive.q - fixed.q).max() < 1e-8
-    assert np.array_equal(adaptive.tau.shape, fixed.tau.shape)
-    assert np.abs(adaptive.tau - fixed.tau).max() < 1e-4
-    assert fixed.statistics.step == 0.002 and fixed.statistics.rtol == 0.0
 
 
 # The plant ----------------------------------------------------------------------------------

@@ -1,12 +1,14 @@
-"""The FMU in programs of others: Ecos (native), libcosim, pathsim-fmi, CasADi's importer.
+"""The FMU in programs of others: Ecos (native), libcosim, pathsim-fmi, CoFMUPy, CasADi's importer.
 
 They live in an environment of their own, named by KR16_HOSTS (its Python); without it nothing
-runs here. `pip install ecospy libcosimpy pathsim-fmi casadi fmpy`; Ecos needs Debian's libtbb12.
+runs here. `.ci/full` makes one: `pip install ecospy libcosimpy pathsim-fmi casadi fmpy`, and
+`cofmupy` where it can be installed; Ecos needs Debian's libtbb12.
 """
 
 from __future__ import annotations
 
 import csv
+import json
 import os
 import subprocess
 from pathlib import Path
@@ -15,19 +17,20 @@ import fmpy
 import pytest
 
 import fmus
-from fmus import BENT, Q
-from kr16cli.fmi import shim
-from kr16cli.fmi.variables import Start
+from fmus import BENT, QD, TAU, Q
+from kr16cli.fmi import compiling
+from kr16cli.fmi.variables import Part, Start
 
 _PYTHON = os.environ.get("KR16_HOSTS", "")
 _SYSTEM = Path("/usr/lib/x86_64-linux-gnu/libpython3.11.so.1.0")
 _START = Start(q=BENT, drives=True)
+_LAW = Start(q=BENT, mode=4)
 _STOP, _STEP = 0.5, 0.001
 
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not _PYTHON, reason="KR16_HOSTS names no Python with the hosts"),
-    pytest.mark.skipif(shim.find_compiler() is None, reason="no C compiler for the shim"),
+    pytest.mark.skipif(compiling.find_compiler() is None, reason="no C compiler for the shim"),
 ]
 
 
@@ -142,6 +145,53 @@ def test_pathsim(tmp_path: Path) -> None:
     # Its clock runs a step behind: the last step is scheduled at, not before, the end.
     near = [_reached_in_fmpy(_STOP + k * _STEP) for k in (-1, 0, 1)]
     assert min(max(abs(a - b) for a, b in zip(angles, q, strict=True)) for q in near) < 1e-9
+
+
+_COFMUPY = """
+import json, sys
+from cofmupy import Coordinator
+def link(a, x, b, y):
+    return {"source": {"id": a, "variable": x}, "target": {"id": b, "variable": y}}
+links = [link("law", f"tau[{i}]", "robot", f"tau[{i}]") for i in range(1, 7)]
+links += [link("robot", f"{n}[{i}]", "law", f"{n}[{i}]") for n in ("q", "qd") for i in range(1, 7)]
+robot, law, bent = sys.argv[1:]
+bent = json.loads(bent)
+start = {f"q[{i}]": q for i, q in enumerate(bent, 1)}  # what is not said here starts at 0
+start |= {f"q_ref[{i}]": q + 0.1 for i, q in enumerate(bent, 1)}
+fmus = [{"id": "robot", "path": robot}, {"id": "law", "path": law, "initialization": start}]
+with open("loop.json", "w") as file:
+    json.dump({"fmus": fmus, "connections": links, "cosim_method": "jacobi"}, file)
+coordinator = Coordinator()
+coordinator.start("loop.json")
+for _ in range(100):
+    coordinator.do_step(0.002)
+angles = (coordinator.get_variable(("robot", f"q[{i}]"))[0] for i in range(1, 7))
+print("angles", *angles)
+"""
+
+
+def test_cofmupy_closes_the_loop_of_two_fmus(tmp_path: Path) -> None:
+    if _run(_PYTHON, "-c", "import cofmupy", folder=tmp_path).returncode:
+        pytest.skip("KR16_HOSTS has no CoFMUPy")
+    # It takes the names of files for those of the FMUs.
+    paths = [tmp_path / "robot.fmu", tmp_path / "law.fmu"]
+    made = fmus.file(_START, with_shim=True), fmus.file(_LAW, Part.CONTROLLER, with_shim=True)
+    for path, source in zip(paths, made, strict=True):
+        path.write_bytes(source.read_bytes())
+    done = _run(_PYTHON, "-c", _COFMUPY, *paths, json.dumps(BENT), folder=tmp_path)
+    assert done.returncode == 0, done.stderr[-500:]
+    line = next(line for line in done.stdout.splitlines() if line.startswith("angles"))
+    with fmus.hosted(made[0]) as robot, fmus.hosted(made[1]) as law:
+        for host in (robot, law):
+            host.begin()
+        law.set([f"q_ref[{i}]" for i in range(1, 7)], [q + 0.1 for q in BENT])
+        for k in range(100):  # Jacobi: both see what the other said at the last point
+            state, tau = robot.get([*Q, *QD]), law.get(TAU)
+            law.set([*Q, *QD], state)
+            robot.set(TAU, tau if k else [0.0] * 6)
+            for host in (robot, law):
+                host.slave.doStep(0.002 * k, 0.002)
+        assert [float(v) for v in line.split()[1:]] == pytest.approx(robot.get(Q), abs=1e-9)
 
 
 _CASADI = """

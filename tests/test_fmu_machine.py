@@ -14,10 +14,10 @@ from scipy.integrate import solve_ivp
 import kr16cli
 from fmus import BENT, QD, TAU, Q
 from kr16cli import InputError, Payload
-from kr16cli.fmi import straight, variables
+from kr16cli.fmi import variables, written
 from kr16cli.fmi.machine import Machine
-from kr16cli.fmi.straight_arm import StraightArm
 from kr16cli.fmi.variables import Part, Start, table
+from kr16cli.fmi.written_arm import WrittenArm
 from kr16cli.robot import RobotData
 from kr16cli.single import Arm
 
@@ -49,8 +49,8 @@ def make(data: RobotData) -> Callable[..., Driven]:
         chosen = Start(q=BENT, **start)  # type: ignore[arg-type]
         return Driven(table(data, chosen, part), data, make_arm, part)
 
-    # Written-out dynamics, which are the model's (test_fmu_straight), several times faster.
-    make_arm = partial(StraightArm, functions=straight.functions(straight.source(data)))
+    # Written-out dynamics, which are the model's (test_fmu_written), several times faster.
+    make_arm = partial(WrittenArm, functions=written.functions(written.python()))
     return made
 
 
@@ -249,7 +249,7 @@ def test_numbers_that_are_not_finite_are_refused(
         (lambda m: m.setup(_NAN, None, None), "start time"),
         (lambda m: m.setup(1.0, 0.5, None), "stop time"),
         (lambda m: m.setup(0.0, None, 0.0), "tolerance"),
-        (lambda m: m.must_be_of([0], ("String",)), "Real"),
+        (lambda m: m.get([0], ("String",)), "Real"),
     ],
 )
 def test_what_makes_no_sense_is_refused_with_a_reason(

@@ -11,9 +11,9 @@ import fmpy
 import pytest
 
 import fmus
-from kr16cli.fmi import shim
+from kr16cli.fmi import compiling
 
-_COMPILER = shim.find_compiler()
+_COMPILER = compiling.find_compiler()
 
 pytestmark = pytest.mark.skipif(_COMPILER is None, reason="no C compiler for the shim")
 

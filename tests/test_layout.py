@@ -31,19 +31,27 @@ _ORDER = (
     {"kernels"},
     {"kinematics"},
     {"api"},
+    {"rollout"},
     {"krl"},
     {"kuka"},
     {"simulate", "export"},
-    {"bench"},
     {"queries"},
     {"verify", "fmi"},
+    {"study"},
     {"report"},
+    {"bench"},
     {"cli"},
 )
 _RANK = {part: rank for rank, row in enumerate(_ORDER) for part in row}
 
 # A library that only one part may import, so that all else runs without it.
-_KEEPERS = {"matplotlib": "report", "pythonfmu": "fmi", "fmpy": "fmi"}
+_KEEPERS = {
+    "matplotlib": "report",
+    "pythonfmu": "fmi",
+    "fmpy": "fmi",
+    "distributed": "study",
+    "pyarrow": "study",
+}
 
 
 def _part(path: Path) -> str:

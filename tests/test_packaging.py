@@ -99,7 +99,7 @@ def test_version_is_the_same_everywhere() -> None:
 def test_extras_are_as_promised() -> None:
     project = tomllib.loads((_ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert set(project["optional-dependencies"]) == {
-        *("fmu", "cross", "report", "cluster", "engines", "test", "all")
+        *("fmu", "cross", "report", "cluster", "tables", "engines", "test", "all")
     }
     needed = [re.split(r"[^\w-]", line)[0] for line in project["dependencies"]]
     assert needed == ["mpmath", "numpy", "scipy", "typer"]
@@ -108,7 +108,7 @@ def test_extras_are_as_promised() -> None:
         *(line for extra in project["optional-dependencies"].values() for line in extra),
     ]
     assert [line for line in everything if ">=" not in line] == [
-        "kr16cli[fmu,cross,report,cluster]"
+        "kr16cli[fmu,cross,report,cluster,tables]"
     ]
 
 

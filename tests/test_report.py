@@ -9,6 +9,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -22,13 +23,15 @@ from matplotlib.figure import Figure
 
 import kr16cli
 from command_line import complains, kr16
-from kr16cli.report import build, typeset
+from kr16cli.report import build, fmus, times, typeset
 from kr16cli.report.content import KINDS, Content, Evidence, outline
-from kr16cli.report.page import HEIGHT, WIDTH
+from kr16cli.report.page import HEIGHT, WIDTH, Page, to_pdf
 from kr16cli.report.sources import read
 from kr16cli.report.style import number, styled
 from kr16cli.simulate.run import Run
-from kr16cli.verify import drawings, registry
+from kr16cli.study.bands import of_motion
+from kr16cli.study.uncertainty import torque_bands
+from kr16cli.verify import registry
 from kr16cli.verify.records import Result, Setting
 
 _WHEN = dt.datetime(2026, 1, 2, tzinfo=dt.UTC)
@@ -61,7 +64,7 @@ def _results() -> tuple[Result, ...]:
     cases = [c for c in registry.cases(registry.SUITES) if c.id in _RUN]
     real = list(registry.run(cases, Setting(kr16cli.load_robot(), quick=True)))
     assert [r.id for r in real if r.status != "passed"] == []
-    time = [0.1 * i for i in range(21)]
+    seconds = [0.1 * i for i in range(21)]
     steps = [0.04, 0.02, 0.01]
     order = {
         "Runge-Kutta step": steps,
@@ -71,12 +74,12 @@ def _results() -> tuple[Result, ...]:
     }
     made = [
         _made("simulation.order", figures=order),
-        _made("simulation.energy", figures={"time": time, "drift": [1e-12 * t for t in time]}),
-        _made("simulation.tolerance", figures={"time": time, "gap": [1e-11 * t for t in time]}),
+        _made("simulation.energy", figures={"time": seconds, "drift": [1e-13] * 21}),
+        _made("simulation.tolerance", figures={"time": seconds, "gap": [1e-12] * 21}),
         _made(
             "engines.pinocchio.motion",
             title="Pinocchio: a simulated motion",
-            figures={"time": time, "gap": [1e-13] * 21},
+            figures={"time": seconds, "gap": [1e-13] * 21},
         ),
         _made(
             "engines.toolbox.fk",
@@ -99,15 +102,15 @@ def _content(
     plan = outline(kind)
     robot = robot or kr16cli.load_robot()
     shown = tuple(r for r in results or _results() if r.group in plan.suites)
-    names = tuple(name for page in plan.pages for name in build.DRAWN.get(page, ()))
-    made, absent = _drawings(names, robot.data.path)
     found = Evidence(shown, 20161, True, "made by a test", **evidence)
+    made, absent = _drawings(kind, robot.data.path, found.run is not None)
     return Content(plan, robot.data, found, made, absent, _WHEN)
 
 
 @cache
-def _drawings(names: tuple[str, ...], path: str) -> tuple[dict[str, Any], dict[str, str]]:
-    return drawings.draw(names, Setting(kr16cli.load_robot(path), quick=True))
+def _drawings(kind: str, path: str, recorded: bool) -> tuple[dict[str, Any], dict[str, str]]:
+    evidence = Evidence((), None, None, "", run=_run() if recorded else None)
+    return build.drawn(outline(kind), Setting(kr16cli.load_robot(path), quick=True), evidence)
 
 
 class _Recorder(RendererBase):
@@ -139,8 +142,63 @@ class _Recorder(RendererBase):
 @cache
 def _figures(kind: str) -> list[Figure]:
     with styled():
-        figures = build.compose(_content(kind, run=_run() if kind == "simulation" else None))
-        return figures.finish()
+        return build.compose(_content(kind, **_extras(kind))).finish()
+
+
+def _extras(kind: str) -> dict[str, Any]:
+    """What only files bring: FMUs on several hosts, times, a recorded motion."""
+    if kind == "verification":
+        return {"fmus": tuple(fmus.cases(_fmu_table())), "bench": times.read(_bench())}
+    return {"run": _run()} if kind == "simulation" else {}
+
+
+def _fmu_row(**changes: Any) -> dict[str, Any]:
+    sizes = {"q": ("rad", 0.0), "qd": ("rad/s", 2e-13), "tau_applied": ("N.m", 3e-11)}
+    deviations = [
+        {"group": g, "largest": size, "unit": unit, "time": 0.3, "relative": size}
+        for g, (unit, size) in sizes.items()
+    ]
+    plain = {
+        "file": "KR16.fmu", "fmi_version": "2.0", "interface": "co-simulation",
+        "host": "FMPy 0.3", "platform": "Linux x86_64", "passed": True, "problems": [],
+        "tolerance": 1e-9, "steps": 100, "deviations": deviations,
+    }  # fmt: skip
+    return plain | changes
+
+
+def _fmu_table(*rows: dict[str, Any]) -> dict[str, Any]:
+    tau = {"group": "tau", "largest": 3e-13, "unit": "N.m", "time": 0.1, "relative": 3e-15}
+    usual = (
+        _fmu_row(),
+        _fmu_row(host="Ecos 0.7"),
+        _fmu_row(file="KR16_controller.fmu", deviations=[tau]),
+        _fmu_row(interface="model-exchange", fmi_version="3.0", platform="Windows x86_64 (wine)"),
+    )
+    data = kr16cli.load_data()
+    return {
+        "schema": "kr16.fmu_table/1",
+        "robot": data.name,
+        "model_sha256": data.sha256,
+        "result": {"rows": list(rows or usual)},
+    }
+
+
+def _bench() -> dict[str, Any]:
+    fk = {"quantity": "fk", "batch_ns": 41.25, "threads_ns": 22.0, "call_ns": 900.0,
+          "peers": {"Pinocchio": 310.0, "MuJoCo": 900.0}, "ratio": 7.5, "gflop_s": 2.5,
+          "gb_s": 9.0, "share": 0.625, "call_ratio": 2.25}  # fmt: skip
+    gravity = {"quantity": "gravity", "batch_ns": 20.0, "threads_ns": 11.0, "call_ns": 800.0}
+    return {
+        "schema": "kr16.bench/1",
+        "input": {"threads": 2},
+        "result": {
+            "engine": "native",
+            "machine": {"cores": 2},
+            "limits": {"gflop_s": 63.0, "read_gb_s": 12.0, "write_gb_s": 15.0},
+            "rows": [fk, gravity],
+        },
+        "warnings": ["times drift"],
+    }
 
 
 @cache
@@ -207,18 +265,49 @@ def test_every_page_has_its_footer_and_says_which_of_how_many(kind: str) -> None
 
 
 def test_the_verification_report_has_all_its_pages() -> None:
-    assert set(_left_out("verification")) == {"speed"}
+    assert set(_left_out("verification")) == {"speed", "fmu"}
     assert len(_drawn("verification")) >= 16
     text = "\n".join(word for page in _drawn("verification") for word, *_ in page)
     for said in (
         "PASSED: all", "not validated on a robot", "Not affiliated with KUKA", "0.158 or 0.115",
         "OUTSIDE LIMITS", "audit only", "NASA-STD-7009B", "kr16 fk 1.5 2.5 -3.5 4.5 5.5 6.5",
         "roboticstoolbox is not installed", "SOURCE_DATE_EPOCH=", "(3.24)", "misprint",
-        "wrist height",
+        "wrist height", "KR16_controller.fmu", "Windows x86_64 (wine)", "quick run, ",
+        "Batches are 8 to 8 times faster than any peer measured",
     ):  # fmt: skip
         assert said in text, said
     for result in _results():
         assert result.id in text
+
+
+def test_the_second_page_tells_what_the_numbers_are_worth() -> None:
+    data = kr16cli.load_data()
+    words = [word for word, *_ in _drawn("verification")[1]]
+    nominal = abs(kr16cli.load_robot().gravity(np.zeros(6))[1])
+    q = np.zeros((1, 6))
+    half = torque_bands(data, q, q, q)[0, 1]
+    said = " ".join(words)
+    assert f"A2 holds {nominal:.0f} ± {half:.0f} N m" in said
+    assert "link[3].mass" in words and "± 20 %" in words
+    assert "kr16 uncertainty --q '0 0 0 0 0 0'" in said
+    assert "trust" in _left_out("dynamics", "chapter3")
+    assert "Chapter 3 test arm states no tolerance" in _left_out("dynamics", "chapter3")["trust"]
+
+
+def test_torque_plots_have_bands_or_say_why_not() -> None:
+    content = _content("dynamics")
+    bands, torques = content.drawings["torque_bands"], content.drawings["torques"]
+    motion = torques["q"], torques["qd"], torques["qdd"]
+    want = torque_bands(content.data, *motion, payload=torques["payload"], drives=True)
+    assert bands["half"] == pytest.approx(want, abs=1e-9)
+    share = (np.abs(torques["tau"]) + want) / torques["limit"]
+    text = " ".join(_said(content))
+    assert f"at most {100 * share.max():.0f} %" in text
+    assert "95 % of the torque this motion needs" in text
+    shown = " ".join(word for page in _drawn("simulation") for word, *_ in page)
+    assert "no band on torque: it is given, the motion answers" in shown
+    around = of_motion(kr16cli.load_data("chapter3"), *motion)
+    assert around.half is None and "states no tolerance" in around.words
 
 
 def test_a_failed_case_is_red_and_says_so_in_words() -> None:
@@ -326,6 +415,54 @@ def test_equal_input_gives_equal_bytes_in_another_process(tmp_path: Path) -> Non
     assert b"/CreationDate (D:20231114221320Z)" in made[0]
 
 
+def test_twenty_pages_take_few_seconds() -> None:
+    content = _content(**_extras("verification"))
+    _pdf("simulation")  # imports and fonts are there
+    start = time.process_time()
+    pdf = build.build(content)
+    spent = time.process_time() - start
+    pages = pdf.count(b"/Type /Page\n") or pdf.count(b"/Type /Page ")
+    assert pages >= 20
+    assert spent / pages * 20 < 8.0
+
+
+def test_words_stand_in_the_file_where_the_page_puts_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pypdf = pytest.importorskip("pypdf")
+
+    def placed() -> list[tuple[str, float, float]]:
+        with styled():
+            page = Page()
+            page.write(100.0, 200.0, "Left. Tiffany's 95 % AV")
+            page.write(300.0, 220.0, "right", size=7.0, face=typeset.BOLD, align="right")
+            page.write(100.0, 240.0, "Ṁ - 2C ‖ Δ", color="#B00020")
+            page.write(100.0, 260.0, "mono ⁻⁹", face=typeset.Face(typeset.MONO))
+            page.write(100.0, 280.0, "q\u0307")  # stands on another letter: shaped by matplotlib
+            pdf = to_pdf([page.figure], {}, _WHEN)
+        found: list[tuple[str, float, float]] = []
+
+        def visit(text: str, cm: Any, tm: Any, font: Any, size: Any) -> None:
+            if text.strip():
+                found.append((text.strip(), cm[4] + tm[4], cm[5] + tm[5]))
+
+        pypdf.PdfReader(BytesIO(pdf)).pages[0].extract_text(visitor_text=visit)
+        return found
+
+    quick = placed()
+    letters = "".join(text for text, *_ in quick).replace(" ", "")
+    assert letters.partition("q\u0307")[:2] == (
+        "Left.Tiffany's95%AVrightṀ-2C‖Δmono⁻⁹",
+        "q\u0307",
+    )
+    assert quick[0][1:] == pytest.approx((100.0, HEIGHT - 200.0 - 0.95 * 9.0), abs=0.01)
+    right = 300.0 - typeset.width("right", 7.0, typeset.BOLD)
+    assert quick[1][1:] == pytest.approx((right, HEIGHT - 220.0 - 0.95 * 7.0), abs=0.01)
+    monkeypatch.setattr("kr16cli.report.words._Letters.of", lambda renderer: None)
+    shaped = placed()
+    assert "".join(text for text, *_ in shaped).replace(" ", "") == letters
+
+
 def _saved(kind: str, **changes: Any) -> dict[str, Any]:
     """What `kr16 verify --json` saves when it keeps the figures."""
     data = kr16cli.load_data()
@@ -391,24 +528,115 @@ def test_a_recorded_run_is_drawn_and_nothing_is_run(tmp_path: Path) -> None:
 
 
 def test_measured_times_are_shown_only_where_given(tmp_path: Path) -> None:
-    row = {"quantity": "fk", "batch_ns": 41.25, "threads_ns": 22.0, "call_ns": 900.0,
-           "peers": {"Pinocchio": 310.0, "MuJoCo": 900.0}, "ratio": 7.5}  # fmt: skip
-    bench = {
-        "schema": "kr16.bench/1",
-        "input": {"threads": 2},
-        "result": {"engine": "native", "machine": {"cores": 2}, "rows": [row]},
-    }
-    results, times = tmp_path / "results.json", tmp_path / "bench.json"
+    results, measured = tmp_path / "results.json", tmp_path / "bench.json"
     results.write_text(json.dumps(_saved("dynamics")), encoding="utf-8")
-    times.write_text(json.dumps(bench), encoding="utf-8")
-    content = build.gather("dynamics", Setting(kr16cli.load_robot()), [results, times])
+    measured.write_text(json.dumps(_bench()), encoding="utf-8")
+    content = build.gather("dynamics", Setting(kr16cli.load_robot()), [results, measured])
     words = _said(content)
-    assert {"41.2", "Pinocchio", "7.5"} <= set(words)
+    assert {"41.2", "Pinocchio", "310.0", "7.5", "2.5", "62 %", "2.25", "times drift"} <= set(words)
     assert "speed" in _left_out("dynamics")
 
 
-def _left_out(kind: str) -> dict[str, str]:
-    content = _content(kind)
+def test_slower_than_a_peer_is_said_in_the_title() -> None:
+    slow = _bench()
+    slow["result"]["rows"][0]["ratio"] = 0.5
+    words = _said(_content(bench=times.read(slow)))
+    assert "Batches are slower than a peer in 1 of 1 quantities" in words
+    alone = _bench()
+    del alone["result"]["rows"][0]
+    words = _said(_content(bench=times.read(alone)))
+    assert "Measured times, as the bench file gives them" in words
+
+
+def test_times_alone_add_their_page_to_suites_that_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "bench.json"
+    file.write_text(json.dumps(_bench()), encoding="utf-8")
+    cases = [c for c in registry.cases(["dynamics"]) if c.id == "dynamics.power"]
+    monkeypatch.setattr(registry, "cases", lambda names: cases)
+    content = build.gather("dynamics", Setting(kr16cli.load_robot(), quick=True), [file])
+    assert [r.id for r in content.results] == ["dynamics.power"]
+    assert content.evidence.source.startswith("run for this report")
+    assert "41.2" in _said(content)
+
+
+# FMUs ----------------------------------------------------------------------------------------
+
+
+def test_an_fmu_built_from_the_robot_moves_as_the_simulator() -> None:
+    pytest.importorskip("pythonfmu")
+    pytest.importorskip("fmpy")
+    result = fmus.own(kr16cli.load_data())
+    assert (result.status, result.group, result.grade) == ("passed", "fmu", "D")
+    assert result.error is not None and result.error <= result.tolerance
+    assert {d["group"] for d in result.figures["deviations"]} >= {"q", "qd", "pose", "energy"}
+
+
+def test_an_arm_that_can_be_no_fmu_is_skipped_with_the_reason() -> None:
+    result = fmus.own(kr16cli.load_data("kr16_l6"))
+    assert result.status == "skipped"
+    content = _content(fmus=(result,))
+    words = "\n".join(_said(content))
+    assert "no inertial data" in content.left_out["fmu"]
+    assert "fmu: KUKA KR 16 L6" in words
+    assert "no inertial data" in words.partition("Identity")[0]
+
+
+def test_checks_of_fmus_are_read_one_or_many_and_judged(tmp_path: Path) -> None:
+    one, many = tmp_path / "one.json", tmp_path / "many.json"
+    row = _fmu_row()
+    check = _fmu_table() | {"schema": "kr16.fmu_check/1", "input": {"file": row.pop("file")}}
+    one.write_text(json.dumps(check | {"result": row}), encoding="utf-8")
+    many.write_text(json.dumps(_fmu_table()), encoding="utf-8")
+    found = read([one, many], outline("verification").suites, kr16cli.load_data())
+    assert [r.id for r in found.fmus] == [
+        "fmu.KR16-CS-FMPy-Linux-x86_64",
+        "fmu.KR16-CS-FMPy-Linux-x86_64-2",
+        "fmu.KR16-CS-Ecos-Linux-x86_64",
+        "fmu.KR16_controller-CS-FMPy-Linux-x86_64",
+        "fmu.KR16-ME-FMPy-Windows-x86_64-wine",
+    ]
+    assert {r.status for r in found.fmus} == {"passed"}
+    assert found.fmus[0].error == 3e-11
+    assert found.fmus[0].worst == {"output": "tau_applied", "at": "0.3 s"}
+
+
+def test_an_fmu_that_deviates_fails_the_report(tmp_path: Path) -> None:
+    far = [
+        {"group": "q", "largest": None, "unit": "rad", "time": 0.2, "relative": None},
+        {"group": "qd", "largest": 3e-4, "unit": "rad/s", "time": 0.1, "relative": 3e-4},
+    ]
+    bad = _fmu_row(passed=False, deviations=far, problems=["q runs away"], host="Other 1.0")
+    results, checks = tmp_path / "results.json", tmp_path / "fmus.json"
+    results.write_text(json.dumps(_saved("verification")), encoding="utf-8")
+    checks.write_text(json.dumps(_fmu_table(_fmu_row(), bad)), encoding="utf-8")
+    content = build.gather("verification", Setting(kr16cli.load_robot()), [results, checks])
+    words = _said(content)
+    assert any(w.startswith("FAILED: 1 of 2 checks of FMUs") for w in words)
+    assert "FAILED fmu.KR16-CS-Other-Linux-x86_64: q runs away" in words
+    assert {"not finite", "3e-4"} <= set(words)
+    assert content.by_margin()[0].id == "fmu.KR16-CS-Other-Linux-x86_64"
+    assert content.count("failed") == 1
+
+
+def test_checks_of_fmus_go_with_the_verification_report_only(tmp_path: Path) -> None:
+    source = tmp_path / "fmus.json"
+    source.write_text(json.dumps(_fmu_table()), encoding="utf-8")
+    complains(
+        kr16("report", "dynamics", "-o", tmp_path / "r.pdf", "--from", source), "verification"
+    )
+
+
+def test_compiled_kernels_are_not_called_another_engine() -> None:
+    native = _made("engines.native.fk", title="Compiled kernels: fk", grade="D")
+    words = _said(_content(results=(*_results(), native)))
+    assert "Pinocchio agree: same numbers, other code" in words
+    assert words.index("The compiled kernels") < words.index("Compiled kernels: fk")
+
+
+def _left_out(kind: str, robot: str | None = None) -> dict[str, str]:
+    content = _content(kind, robot=kr16cli.load_robot(robot) if robot else None)
     with styled():
         build.compose(content)
     return content.left_out
@@ -454,6 +682,8 @@ def test_what_cannot_be_done_is_said_in_a_line(
         ("[1]", "no JSON object"),
         ('{"schema": "kr16.fk/1"}', "neither"),
         (json.dumps({"schema": "kr16.bench/1", "result": {"rows": [{}]}}), "not whole"),
+        (json.dumps({"schema": "kr16.fmu_table/1", "result": {"rows": [{}]}}), "not whole"),
+        (json.dumps({"schema": "kr16.fmu_check/1", "result": []}), "not whole"),
     ],
 )
 def test_a_file_that_holds_no_results_is_refused(content: str, said: str, tmp_path: Path) -> None:
@@ -531,6 +761,10 @@ def test_wrapped_lines_fit_and_lose_no_letter() -> None:
         ("Atan2(r32,", [("Atan2", 0), ("(", 0), ("r", 0), ("32", -1), (",", 0)]),
         ("omega_i", [("\u03c9", 0), ("i", -1)]),
         ("dq6", [("q\u0307", 0), ("6", -1)]),
+        ("p x q", [("p", 0), ("\u00d7", 0), ("q", 0)]),
+        ("for x >= 0", [("for", 0), ("x", 0), ("\u2265", 0), ("0", 0)]),
+        ("u for x < 0", [("u", 0), ("for", 0), ("x", 0), ("<", 0), ("0", 0)]),
+        ("of roll-pitch-yaw", [("of", 0), ("roll-pitch-yaw", 0)]),
         ("q_{1,i}", [("q", 0), ("1", -1), (",", -1), ("i", -1)]),
     ],
 )

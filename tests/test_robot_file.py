@@ -254,7 +254,7 @@ def test_the_hash_ignores_comments_order_format_sources_and_path(tmp_path):
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_hash_depends_on_every_number_and_on_the_name(name):
     seen = {load_data(name).sha256}
-    ways = numbers_of(shipped_table(name))
+    ways = [way for way in numbers_of(shipped_table(name)) if "note" not in way]
     for way in ways:
         table = shipped_table(name)
         table.pop("conflict", None)
@@ -310,7 +310,7 @@ RULES = [
     ([*G, "source"], MISSING, "geometry.source missing", "this key is needed"),
     ([*G, "note"], 3, "geometry.note = 3", "must be a table"),
     ([*G, "note", "d9"], {"text": "x"}, "geometry.note.d9", "unknown key; did you mean"),
-    ([*G, "note", "d1"], {}, "geometry.note.d1 = {}", "a status, a source or a text"),
+    ([*G, "note", "d1"], {}, "geometry.note.d1 = {}", "a status, a source, a text or a tolerance"),
     ([*G, "note", "d1"], "x", "geometry.note.d1 = 'x'", "must be a table, is text"),
     ([*G, "note", "d1"], {"status": "?"}, "geometry.note.d1.status = '?'", "must be one of"),
     ([*G, "note", "d1"], {"source": []}, "geometry.note.d1.source = []", "must be a list of keys"),

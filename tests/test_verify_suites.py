@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,9 +14,11 @@ import numpy as np
 import pytest
 
 import kr16cli
+from kr16cli.kernels.engine import engine_name, has_native
 from kr16cli.model import chain, coriolis, dynamics, forward, inertia, jacobian, posture
 from kr16cli.robot import RobotData
 from kr16cli.verify import measure, registry, report_text, sampling
+from kr16cli.verify.engines import SOURCES
 from kr16cli.verify.independent import exponentials, roots
 from kr16cli.verify.records import Result, Setting
 
@@ -57,6 +60,43 @@ def test_kinematics_only_robot_skips_dynamics_and_passes_the_rest() -> None:
         results = _verdicts(suite, robot)
         assert [(r.id, r.evidence) for r in results if r.status == "failed"] == []
     assert all(r.status == "skipped" for r in _verdicts("simulation", robot))
+
+
+def test_every_numbered_equation_has_a_property_case_beside_its_audit() -> None:
+    named = {e for c in registry.cases(_SUITES) for e in c.equations}
+    assert {f"3.{k}" for k in range(1, 52)} <= named
+    audited = {e for c in registry.cases(["chapter"]) for e in c.equations}
+    assert {f"3.{k}" for k in range(1, 52)} <= audited
+
+
+def test_every_known_motion_is_a_case_of_the_simulation() -> None:
+    ids = {c.id.partition(".")[2] for c in registry.cases(["simulation"])}
+    assert ids >= {
+        "order", "energy", "work", "pendulum", "joint-errors", "task-errors", "reversal",
+        "mujoco", "pinocchio", "lagrange",
+    }  # fmt: skip
+
+
+def test_cases_on_other_engines_say_so_and_name_an_engine_there_is() -> None:
+    for case in registry.cases(_SUITES):
+        others = [name for name in SOURCES if name in case.id.split(".")]
+        assert case.engine == (others[0] if others else None), case.id
+
+
+def test_model_runs_on_its_own_source_unless_an_engine_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("KR16_ENGINE", raising=False)
+    with registry.model_source():
+        assert engine_name() == "numpy"
+        with registry.using_engine("native" if has_native() else "numpy"):
+            assert engine_name() == ("native" if has_native() else "numpy")
+        assert engine_name() == "numpy"
+    assert "KR16_ENGINE" not in os.environ
+    monkeypatch.setenv("KR16_ENGINE", "numpy")
+    with registry.model_source():
+        pass
+    assert os.environ["KR16_ENGINE"] == "numpy"
 
 
 def test_every_case_says_what_it_is() -> None:

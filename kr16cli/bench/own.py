@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from kr16cli.api import Robot
 from kr16cli.bench.timing import nanoseconds
-from kr16cli.kernels import engine_name
 from kr16cli.kernels.quantities import QUANTITIES
 
 MEASURED = (
@@ -46,9 +45,29 @@ def _row(
         "threads_ns": nanoseconds(lambda: ask(*arguments, out=out, threads=threads), n, rounds),
         "call_ns": nanoseconds(lambda: ask(*one), 1, rounds),
     }
-    if engine_name() == "native":
-        from kr16cli.kernels import _native
-
-        operations = _native.operations()[f"{name}_vertical" if QUANTITIES[name].gravity else name]
-        row |= {"operations": operations, "gflop_s": operations / row["batch_ns"]}
     return row
+
+
+def near_the_limit(rows: Sequence[dict[str, Any]], rounds: int) -> dict[str, float]:
+    """Add to each row what its kernel does a second, and which part of the machine's most.
+
+    `share` is the time that the binding limit, arithmetic or memory, leaves no program below,
+    over the time taken. Returns the limits, one core's, in 1e9/s. Compiled kernels only.
+    """
+    from kr16cli.bench.machine import cost, limits
+
+    most = limits(rounds)
+    for row in rows:
+        name = row["quantity"]
+        given = tuple(i for i in QUANTITIES[name].inputs if i != "near")
+        takes = cost(name, given)
+        row |= {
+            "gflop_s": takes.flops / row["batch_ns"],
+            "gb_s": (takes.read + takes.write) / row["batch_ns"],
+            "share": takes.bound(most) * 1e9 / row["batch_ns"],
+        }
+    return {
+        "gflop_s": most.flops / 1e9,
+        "read_gb_s": most.read / 1e9,
+        "write_gb_s": most.write / 1e9,
+    }

@@ -6,6 +6,7 @@ The arm given to them has the same joints; values are compared in `verify`, not 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,10 @@ from kr16cli.export.mjcf import mjcf
 from kr16cli.export.urdf import urdf
 
 _LOOP = 500
+
+LOOP = "Pinocchio, a loop"
+THREADS = 2
+"""Of a peer's own parallel batch, compared with one thread of this library."""
 
 
 def measure(robot: Robot, made: Mapping[str, Any], rounds: int) -> dict[str, dict[str, Any]]:
@@ -63,7 +68,7 @@ def _pinocchio(robot: Robot, made: Mapping[str, Any]) -> Calls:
         pin.computeJointJacobiansTimeVariation(model, data, a, b)
         return pin.getFrameJacobianTimeVariation(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
 
-    label = "Pinocchio, a loop"
+    label = LOOP
     yield ("fk", label), _looped(fk, q)
     yield ("jacobian", label), _looped(jacobian, q)
     yield ("jacobian_dot", label), _looped(jacobian_dot, q, qd)
@@ -81,6 +86,14 @@ def _pinocchio(robot: Robot, made: Mapping[str, Any]) -> Calls:
         ("forward_dynamics", label),
         _looped(lambda a, b, c: pin.aba(model, data, a, b, c), q, qd, tau),
     )
+    pool = pin.ModelPool(model, THREADS)
+    label = f"Pinocchio, {THREADS} threads"
+    for name, call, columns in (
+        ("inverse_dynamics", pin.rneaInParallel, (q, qd, qdd)),
+        ("forward_dynamics", pin.abaInParallel, (q, qd, tau)),
+    ):
+        turned = [np.asfortranarray(c.T) for c in columns]
+        yield (name, label), (partial(call, THREADS, pool, *turned), len(q))
 
 
 def _mujoco(robot: Robot, made: Mapping[str, Any]) -> Calls:

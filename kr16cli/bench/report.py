@@ -8,28 +8,46 @@ from collections.abc import Mapping
 from typing import Any
 
 from kr16cli.api import Robot
-from kr16cli.bench import own, peers
+from kr16cli.bench import motion, own, peers, rollouts
 from kr16cli.kernels import engine_name
 
 SCHEMA = "kr16.bench/1"
-UNITS = {"batch_ns": "ns", "threads_ns": "ns", "call_ns": "ns", "peers": "ns", "gflop_s": "1e9/s"}
+UNITS = {
+    **dict.fromkeys(("batch_ns", "threads_ns", "call_ns", "peers"), "ns"),
+    **{"gflop_s": "1e9/s", "gb_s": "1e9 B/s", "motions": "s"},
+}
 
 
 def bench(robot: Robot, *, n: int, threads: int, rounds: int, with_peers: bool) -> dict[str, Any]:
-    """Measure; ratios are the fastest peer's time over the batch time of this engine."""
+    """Measure. `ratio`: the fastest peer's time over the batch time of this engine.
+
+    `call_ratio`: a call of Pinocchio over a call of this library.
+    """
     rows = own.measure(robot, n, threads, rounds)
     others = peers.measure(robot, own.inputs(robot, n), rounds) if with_peers else {}
     for row in rows:
         found = others.get(row["quantity"], {})
         row["peers"] = found
         row["ratio"] = min(found.values()) / row["batch_ns"] if found else None
+        loop = found.get(peers.LOOP)
+        row["call_ratio"] = loop / row["call_ns"] if loop else None
+    figures = []
+    if with_peers:
+        figures = [*motion.measure(robot, rounds), *rollouts.measure(robot, rounds)]
+    limits = own.near_the_limit(rows, rounds) if engine_name() == "native" else {}
     return {
         "schema": SCHEMA,
         "robot": robot.data.name,
         "model_sha256": robot.data.sha256,
         "units": UNITS,
         "input": {"configurations": n, "threads": threads, "rounds": rounds},
-        "result": {"engine": engine_name(), "machine": machine(), "rows": rows},
+        "result": {
+            "engine": engine_name(),
+            "machine": machine(),
+            "limits": limits,
+            "rows": rows,
+            "motions": [figure._asdict() for figure in figures],
+        },
         "warnings": ["wall times of a shared machine drift; compare the ratios of one run"],
     }
 
@@ -50,15 +68,29 @@ def table(answer: Mapping[str, Any]) -> str:
     head = (
         f"engine {result['engine']}, {given['configurations']} configurations, ns each\n"
         f"  {'quantity':<18}{'batch':>9}{given['threads']:>3} thr{'one call':>10}{'Gop/s':>8}"
-        f"{'ratio':>8}  fastest peer"
+        f"{'GB/s':>6}{'of most':>8}{'ratio':>8}{'call':>6}  fastest peer"
     )
-    return "\n".join([head, *map(_line, result["rows"])]) + "\n"
+    most = result["limits"]
+    foot = (
+        [
+            f"most of one core: {most['gflop_s']:.0f} Gop/s, memory {most['read_gb_s']:.0f} GB/s "
+            f"read, {most['write_gb_s']:.0f} GB/s written; 'of most' is of the one that binds"
+        ]
+        if most
+        else []
+    )
+    moving = motion.lines(result["motions"])
+    foot += ["motions, least time and ratio", *moving] if moving else []
+    return "\n".join([head, *map(_line, result["rows"]), *foot]) + "\n"
 
 
 def _line(row: Mapping[str, Any]) -> str:
     peer = min(row["peers"], key=row["peers"].get) if row["peers"] else None
-    rate = f"{row['gflop_s']:8.1f}" if "gflop_s" in row else " " * 8
+    rate = " " * 22
+    if "share" in row:
+        rate = f"{row['gflop_s']:8.1f}{row['gb_s']:6.1f}{100 * row['share']:6.0f} %"
     ratio = f"{row['ratio']:8.1f}" if row["ratio"] is not None else " " * 8
+    ratio += f"{row['call_ratio']:6.1f}" if row["call_ratio"] is not None else " " * 6
     told = f"  {peer} {row['peers'][peer]:.0f} ns" if peer else ""
     return (
         f"  {row['quantity']:<18}{row['batch_ns']:9.1f}{row['threads_ns']:7.1f}"

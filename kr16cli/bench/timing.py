@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 _LEAST = 0.02
 """Seconds a run should last, so that the clock's own cost does not count."""
@@ -26,3 +26,12 @@ def _run(call: Callable[[], object], repeat: int) -> float:
     for _ in range(repeat):
         call()
     return time.perf_counter() - start
+
+
+def least(calls: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, float]:
+    """Least time of each call, s; they take turns, so that drift touches all alike."""
+    found = dict.fromkeys(calls, float("inf"))
+    for _ in range(rounds):
+        for name, call in calls.items():
+            found[name] = min(found[name], _run(call, 1))
+    return found

@@ -3,15 +3,49 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from collections.abc import Mapping, Sequence
-from io import BytesIO
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
+from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from kr16cli.queries.common import Answer, Question
+from kr16cli.cli import sinks
+from kr16cli.queries.common import Question
 from kr16cli.robot import RobotData
+
+Array = NDArray[np.float64]
+
+
+class _Column:
+    """An array that grows; what is not given is NaN."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self.shape = shape
+        self._numbers = sinks.Spool()
+        self._rows = 0
+
+    def append(self, rows: Array) -> None:
+        """Add rows (n, *shape)."""
+        numbers = np.ascontiguousarray(rows, dtype="<f8").reshape(-1)
+        self._numbers.write(numbers.view(np.uint8).data)
+        self._rows += len(rows)
+
+    def fill(self, rows: int) -> None:
+        """Add NaN up to so many rows."""
+        for _ in range(self._rows, rows, 4096):
+            self.append(np.full((min(4096, rows - self._rows), *self.shape), np.nan))
+
+    def write(self, out: IO[bytes]) -> None:
+        """The array as a npy file."""
+        shape = (self._rows, *self.shape)
+        npy.write_array_header_1_0(out, {"descr": "<f8", "fortran_order": False, "shape": shape})
+        self._numbers.pour(out)
+
+    def close(self) -> None:
+        """Let go of the numbers."""
+        self._numbers.close()
 
 
 class NpzSink:
@@ -19,32 +53,71 @@ class NpzSink:
 
     def __init__(self, question: Question, data: RobotData) -> None:
         self._question, self._data = question, data
-        self._rows: list[dict[str, NDArray[np.float64]] | None] = []
-        self._statuses: list[str] = []
+        self._columns: dict[str, _Column] = {}
+        self._words: dict[str, int] = {}
+        self._statuses = bytearray()
 
-    def add(self, answer: Answer | None, status: str, reason: str | None) -> None:
+    def _column(self, name: str, shape: tuple[int, ...]) -> _Column:
+        column = self._columns.get(name)
+        if column is None:
+            column = self._columns[name] = _Column(shape)
+        column.fill(len(self._statuses))
+        return column
+
+    def _status(self, word: str) -> int:
+        return self._words.setdefault(word, len(self._words))
+
+    def add(self, told: sinks.Told) -> None:
         """Take a row's numbers."""
-        given = None if answer is None else self._question.arrays(answer.result)
-        self._rows.append(given and {name: np.array(v, dtype=float) for name, v in given.items()})
-        self._statuses.append(status)
+        for name, value in self._numbers(told).items():
+            self._column(name, value.shape).append(value[None])
+        self._statuses.append(self._status(told.status))
 
-    def content(self, inputs: Mapping[str, Any], warnings: Sequence[str]) -> bytes:
+    def _numbers(self, told: sinks.Told) -> dict[str, Array]:
+        if told.answer is None:
+            return {}
+        given = self._question.arrays(told.answer.result)
+        return {name: np.array(value, dtype=float) for name, value in given.items()}
+
+    def add_block(self, answered: sinks.Answered) -> None:
+        """Take the numbers of rows."""
+        told = {i: self._numbers(row) for i, row in answered.told.items()}
+        for name, array in answered.many.arrays.items():
+            rows = array
+            if told:
+                rows = np.full((answered.size, *array.shape[1:]), np.nan)
+                rows[answered.sound] = array
+                for i, numbers in told.items():
+                    rows[i] = numbers.get(name, np.nan)
+            self._column(name, array.shape[1:]).append(rows)
+        words = bytearray([self._status("ok")]) * answered.size
+        for i, row in answered.told.items():
+            words[i] = self._status(row.status)
+        self._statuses += words
+
+    def write(self, out: IO[bytes], inputs: Mapping[str, Any], warnings: Sequence[str]) -> None:
         """The npz file, with units, robot, model hash and warnings as text."""
-        shapes = {name: v.shape for row in self._rows if row for name, v in row.items()}
-        arrays: dict[str, Any] = {}
-        for name, shape in shapes.items():
-            arrays[name] = np.full((len(self._rows), *shape), np.nan)
-            for i, row in enumerate(self._rows):
-                if row and name in row:
-                    arrays[name][i] = row[name]
-        arrays["status"] = np.array(self._statuses, dtype=np.str_)
-        for name, text in (
-            ("units", json.dumps(self._question.units)),
-            ("robot", self._data.name),
-            ("model_sha256", self._data.sha256),
-            ("warnings", "\n".join(warnings)),
-        ):
-            arrays[name] = np.array(text)
-        out = BytesIO()
-        np.savez(out, **arrays)
-        return out.getvalue()
+        used = sorted(set(self._statuses))
+        words = np.array([word for word, i in self._words.items() if i in used], dtype=np.str_)
+        places = np.zeros(256, dtype=np.intp)
+        places[used] = np.arange(len(used))
+        texts = {
+            "status": words[places[np.frombuffer(self._statuses, dtype=np.uint8)]],
+            "units": np.array(json.dumps(self._question.units)),
+            "robot": np.array(self._data.name),
+            "model_sha256": np.array(self._data.sha256),
+            "warnings": np.array("\n".join(warnings)),
+        }
+        with zipfile.ZipFile(out, "w") as archive:
+            for name, column in self._columns.items():
+                column.fill(len(self._statuses))
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                    column.write(file)
+            for name, text in texts.items():
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                    npy.write_array(file, text, allow_pickle=False)
+
+    def close(self) -> None:
+        """Let go of what was collected."""
+        for column in self._columns.values():
+            column.close()

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from io import BytesIO
 from typing import TYPE_CHECKING, NamedTuple
 
 from kr16cli.cli import output, rows, sinks
 from kr16cli.errors import InputError, Kr16Error
 
 if TYPE_CHECKING:
+    from kr16cli.cli import blocks
     from kr16cli.queries.common import Answer, Question
     from kr16cli.robot import RobotData
 
@@ -36,29 +39,32 @@ def answer_rows(
     Nothing is written before the last row is done, so an interrupted batch leaves no half.
     """
     batch = rows.read(source, question.reads, question.optional, si=common.si)
-    sink = _sink(question, data, common.kind)
-    warnings = _Gathered()
-    problems: list[str] = []
-    bad = count = 0
-    for row in batch.rows:
-        count += 1
-        answer, problem = _answer(question, row, track=common.track)
-        sink.add(answer, "bad" if answer is None else answer.status, problem)
-        warnings.add(count, answer.warnings if answer else ())
-        if problem is not None:
-            bad += 1
-            if len(problems) < _SHOWN:
-                problems.append(f"row {count}: {problem}")
-        _tick(count, batch.expected)
+    with closing(_sink(question, data, common.kind)) as sink:
+        return _answered(question, common, batch, sink, target)
+
+
+def _answered(
+    question: Question, common: Common, batch: rows.Batch, sink: sinks.Sink, target: output.Target
+) -> int:
+    work = _Work(question, sink, batch.expected)
+    if batch.blocks is not None:
+        question.quicken()
+    if batch.blocks is not None and question.takes_many(common.kind) and not common.track:
+        for block in batch.blocks:
+            work.block(block)
+    else:
+        for row in batch.rows:
+            work.row(row, track=common.track)
     _tick(0, batch.expected)
+    count, bad, problems = work.count, work.bad, work.problems
     if bad and common.strict:
         more = f" ({bad} such rows)" if bad > 1 else ""
         raise InputError(f"{batch.name}, {problems[0]}{more}; --strict: nothing is written")
-    texts = [*batch.warnings, *warnings.texts()]
+    texts = [*batch.warnings, *work.warnings.texts()]
     if common.kind in ("csv", "table"):
         texts += unlisted(question, common.kind)
     inputs = {"source": batch.name, "rows": count, **question.options}
-    target.write(sink.content(inputs, texts))
+    target.write_with(lambda out: sink.write(out, inputs, texts))
     if common.kind != "json":
         warn(texts)
     warn(problems, "")
@@ -68,11 +74,13 @@ def answer_rows(
     return 1 if bad else 0
 
 
-def one_row(question: Question, data: RobotData, kind: str, answer: Answer) -> str | bytes:
+def one_row(question: Question, data: RobotData, kind: str, answer: Answer) -> bytes:
     """A single answer as a CSV or npz file of one row."""
-    sink = _sink(question, data, kind)
-    sink.add(answer, answer.status, answer.problem)
-    return sink.content({}, [])
+    out = BytesIO()
+    with closing(_sink(question, data, kind)) as sink:
+        sink.add(sinks.Told(answer, answer.status, answer.problem))
+        sink.write(out, {}, [])
+    return out.getvalue()
 
 
 def unlisted(question: Question, kind: str) -> list[str]:
@@ -96,20 +104,67 @@ def _sink(question: Question, data: RobotData, kind: str) -> sinks.Sink:
         return NpzSink(question, data)
     if kind == "json":
         return sinks.JsonSink(question)
-    return sinks.TextSink(question, table=kind == "table")
+    return sinks.TableSink(question) if kind == "table" else sinks.CsvSink(question)
 
 
-def _answer(question: Question, row: rows.Row, *, track: bool) -> tuple[Answer | None, str | None]:
-    """The answer to one row, or None, and what is wrong with the row."""
-    if row.problem is not None:
-        return None, row.problem
-    try:
-        answer = question.finite_answer(row.values)
-    except Kr16Error as error:
-        return None, str(error)
-    if track:
-        question.follow(answer)
-    return answer, answer.problem
+class _Work:
+    """Rows answered so far, and what went wrong with them."""
+
+    def __init__(self, question: Question, sink: sinks.Sink, expected: int) -> None:
+        self._question, self._sink, self._expected = question, sink, expected
+        self.count = self.bad = 0
+        self.problems: list[str] = []
+        self.warnings = _Gathered()
+
+    def row(self, row: rows.Row, *, track: bool = False) -> None:
+        """Answer the next row."""
+        told = self._told(row)
+        if track and told.answer is not None:
+            self._question.follow(told.answer)
+        self._sink.add(told)
+        self.count += 1
+        self._note(self.count, told)
+        _tick(self.count, self._expected)
+
+    def block(self, block: blocks.Block) -> None:
+        """Answer the next rows at once, and those that need care one by one."""
+        if not len(block.sound):
+            for row in block.rows():
+                self.row(row)
+            return
+        told = {i: sinks.Told(None, "bad", problem) for i, problem in block.problems.items()}
+        many = self._question.many(block.values)
+        for k in many.care.nonzero()[0].tolist():
+            row = rows.Row({name: array[k].tolist() for name, array in block.values.items()})
+            told[int(block.sound[k])] = self._told(row)
+        self._sink.add_block(sinks.Answered(block.size, block.sound, many, told))
+        warned = {int(block.sound[k]): k for k in many.warned.nonzero()[0].tolist()}
+        for i in sorted(told.keys() | warned.keys()):
+            number = self.count + i + 1
+            if i in told:
+                self._note(number, told[i])
+            else:
+                self.warnings.add_from(number, many.warnings, warned[i])
+        self.count += block.size
+        _tick(self.count, self._expected, every=1)
+
+    def _told(self, row: rows.Row) -> sinks.Told:
+        """The answer to one row, or what is wrong with the row."""
+        if row.problem is not None:
+            return sinks.Told(None, "bad", row.problem)
+        try:
+            answer = self._question.finite_answer(row.values)
+        except Kr16Error as error:
+            return sinks.Told(None, "bad", str(error))
+        return sinks.Told(answer, answer.status, answer.problem)
+
+    def _note(self, number: int, told: sinks.Told) -> None:
+        """Count a row's problem and warnings."""
+        self.warnings.add(number, told.answer.warnings if told.answer else ())
+        if told.reason is not None:
+            self.bad += 1
+            if len(self.problems) < _SHOWN:
+                self.problems.append(f"row {number}: {told.reason}")
 
 
 class _Gathered:
@@ -129,6 +184,13 @@ class _Gathered:
                 if len(first) < 3:
                     first.append(row)
 
+    def add_from(self, row: int, texts_of: Callable[[int], Sequence[str]], index: int) -> None:
+        """Note the warnings of a row that has some, without asking for them where it can."""
+        if len(self._about) > _SHOWN:
+            self._rows += 1
+        else:
+            self.add(row, texts_of(index))
+
     def texts(self) -> list[str]:
         """A sentence for each warning."""
         if len(self._about) > _SHOWN:
@@ -141,9 +203,9 @@ class _Gathered:
         ]
 
 
-def _tick(done: int, total: int) -> None:
+def _tick(done: int, total: int, *, every: int = 500) -> None:
     """Count rows on stderr of a long batch, on a terminal only; 0 wipes the line."""
-    if total < 2000 or done % 500 or sys.stderr is None or not sys.stderr.isatty():
+    if total < 2000 or done % every or sys.stderr is None or not sys.stderr.isatty():
         return
-    text = f"\r{done} of {total} rows" if done else "\r\x1b[K"
+    text = f"\r{done} of about {max(done, total)} rows" if done else "\r\x1b[K"
     print(text, end="", file=sys.stderr, flush=True)

@@ -13,6 +13,7 @@ import typer
 from kr16cli.assets import asset
 from kr16cli.cli import output as out
 from kr16cli.cli import render, rows, run
+from kr16cli.cli.progress import Bar
 from kr16cli.errors import FileError, InputError
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ PoseFile = Annotated[
     str,
     typer.Argument(
         metavar="FILE.csv",
-        help="Columns a1..a6 (deg) and x,y,z,a,b,c (mm, deg); example_poses is a made-up one.",
+        help="Columns a1..a6 and x,y,z,a,b,c, in deg and mm; example_poses is a made-up one.",
     ),
 ]
 
@@ -61,7 +62,7 @@ def suites(ctx: typer.Context) -> int:
     if ctx.params.get("list_"):
         sys.stdout.write(report_text.listing(cases))
         return 0
-    setting = _setting(ctx)
+    setting = make_setting(ctx)
     inputs = {"suites": names, "quick": setting.quick, "seed": setting.seed}
     with _Targets(ctx) as targets:
         results = _run(cases, setting)
@@ -73,7 +74,7 @@ def _self_test(ctx: typer.Context) -> int:
     from kr16cli.robot_file import load_data
     from kr16cli.verify import fault_text, selftest
 
-    setting = _setting(ctx)
+    setting = make_setting(ctx)
     if setting.robot.data.sha256 != load_data().sha256:
         raise InputError("--self-test seeds faults in the shipped robot; leave --robot out")
     if ctx.params.get("suite"):
@@ -82,10 +83,10 @@ def _self_test(ctx: typer.Context) -> int:
     inputs = {"self_test": True, "quick": setting.quick, "seed": setting.seed}
     with _Targets(ctx) as targets:
         found = {}
-        with _Bar(len(seeded)) as bar:
+        with Bar() as bar:
             for fault in selftest.run(seeded, setting.seed):
                 found[fault.mutant.id] = fault
-                bar.show(len(found), fault.mutant.id)
+                bar.show(len(found), len(seeded), fault.mutant.id)
         faults = [found[mutant.id] for mutant in seeded]
         extra = fault_text.counts(faults) | {"faults": [f.entry() for f in faults]}
         targets.write(setting.robot.data, inputs, [], extra, fault_text.table(faults))
@@ -96,7 +97,7 @@ def chapter(ctx: typer.Context) -> int:
     """Judge every equation of the chapter; 1 if a verdict is not proved."""
     from kr16cli.verify.chapter import audit, to_json
 
-    setting = _setting(ctx)
+    setting = make_setting(ctx)
     inputs = {"quick": setting.quick, "seed": setting.seed}
     with _Targets(ctx) as targets:
         equations = audit(setting)
@@ -132,40 +133,46 @@ def poses(ctx: typer.Context, file: str) -> int:
     from kr16cli import kuka, units
     from kr16cli.verify import pose_check, report_text
 
-    data = run.load(ctx)
+    data, si = run.load(ctx), bool(_parameter(ctx, "si"))
     with _Targets(ctx) as targets:
         shipped = file == "example_poses" and not Path(file).exists()
+        if shipped and si:
+            raise InputError("example_poses is in mm and degrees; leave out --si")
         source = str(asset(f"data/reference/{file}.csv")) if shipped else file
-        pairs = list(rows.read(source, "q", ("pose",)).rows)
+        pairs = list(rows.read(source, "q", ("pose",), si=si).rows)
         for i, row in enumerate(pairs, 1):
             if row.problem or len(row.values.get("pose", ())) != 6:
                 reason = row.problem or "no pose; the header must name x, y, z, a, b, c as well"
                 raise FileError(file, f"row {i}: {reason}")
-        q = np.array([[units.rad(v) for v in row.values["q"]] for row in pairs])
-        T = np.array([kuka.matrix_from_pose(row.values["pose"]) for row in pairs])
-        found = pose_check.check(data, q, T)
+        q = np.array([[v if si else units.rad(v) for v in row.values["q"]] for row in pairs])
+        T = np.array([kuka.matrix_from_pose(row.values["pose"], si=si) for row in pairs])
+        found = pose_check.check(data, q, T, si=si)
         extra = {
             "base": _pose(found.base),
             "tool": _pose(found.tool),
             "recorded": found.recorded,
             "rows": found.rows,
         }
+        length, angle = ("m", "rad") if si else ("mm", "deg")
         fitted = render.grid(
-            ["best fit", *(f"{n} {'mm' if n in 'XYZ' else 'deg'}" for n in kuka.POSE_FIELDS)],
+            ["best fit", *(f"{n} {length if n in 'XYZ' else angle}" for n in kuka.POSE_FIELDS)],
             [
-                [name, *(render.shown(v, "mm") for v in pose)]
+                [name, *(render.shown(v, length) for v in pose)]
                 for name, pose in (("base", found.base), ("tool", found.tool))
             ],
         )
         text = report_text.table(found.results) + "\n" + "\n".join(fitted) + "\n"
-        return targets.write(data, {"file": file}, found.results, extra, text)
+        frames = {"base": f"{length} {angle}", "tool": f"{length} {angle}"}
+        inputs = {"file": file, "si": si}
+        return targets.write(data, inputs, found.results, extra, text, frames)
 
 
 def _pose(pose: Sequence[float]) -> dict[str, float]:
     return dict(zip("xyzabc", (v + 0.0 for v in pose), strict=True))
 
 
-def _setting(ctx: typer.Context) -> Setting:
+def make_setting(ctx: typer.Context) -> Setting:
+    """The robot, the seed and whether to be quick, of --robot, --seed and --quick."""
     from kr16cli.api import Robot
     from kr16cli.verify.records import Setting
 
@@ -194,32 +201,11 @@ def _run(cases: Sequence[Case], setting: Setting) -> list[Result]:
     from kr16cli.verify import registry
 
     results: list[Result] = []
-    with _Bar(len(cases)) as bar:
+    with Bar() as bar:
         for result in registry.run(cases, setting):
             results.append(result)
-            bar.show(len(results), result.id)
+            bar.show(len(results), len(cases), result.id)
     return results
-
-
-class _Bar:
-    """Progress on a terminal's stderr; nothing elsewhere."""
-
-    def __init__(self, count: int) -> None:
-        self._count = count
-        self._shown = sys.stderr is not None and sys.stderr.isatty()
-
-    def __enter__(self) -> _Bar:
-        return self
-
-    def __exit__(self, *details: object) -> None:
-        if self._shown:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
-
-    def show(self, done: int, what: str) -> None:
-        """So many are done, `what` the last of them."""
-        if self._shown:
-            text = f"{'#' * round(30 * done / self._count):-<30} {done} of {self._count} {what}"
-            print(f"\r\x1b[K{text[:78]}", end="", file=sys.stderr, flush=True)
 
 
 class _Targets:
@@ -250,6 +236,7 @@ class _Targets:
         results: Sequence[Result],
         extra: Mapping[str, Any] | None = None,
         text: str | None = None,
+        units: Mapping[str, str] | None = None,
     ) -> int:
         """Write what was found, whole; 1 if a case failed."""
         from kr16cli.verify import report_text as text_of
@@ -265,7 +252,7 @@ class _Targets:
                 "schema": "kr16.verify/1",
                 "robot": data.name,
                 "model_sha256": data.sha256,
-                "units": {"error": "as `unit` of each case"},
+                "units": {"error": "as `unit` of each case", **(units or {})},
                 "input": dict(inputs),
                 "result": found,
                 "warnings": [],

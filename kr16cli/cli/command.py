@@ -150,8 +150,8 @@ class _Sorter:
 
     @staticmethod
     def is_option(word: str) -> bool:
-        """A word with a dash that is not a number, a list of numbers, or the dash of stdin."""
-        head = word.replace(";", ",").split(",")[0].split()
+        """A word with a dash that is no number, list or range of numbers, or the dash of stdin."""
+        head = word.replace(";", ",").replace(":", ",").split(",")[0].split()
         return word.startswith("-") and word != "-" and bool(head) and not is_number(head[0])
 
     @staticmethod

@@ -5,25 +5,26 @@ from __future__ import annotations
 from typer import Context
 
 from kr16cli.cli import fmus as f
+from kr16cli.cli import fmus_native as n
 from kr16cli.cli.command import Command, LeanGroup, new_app
 from kr16cli.cli.options import Json, Output, Robot
 
 app = new_app(cls=LeanGroup)
-
 
 app.callback()(f.group)
 
 
 @app.command(cls=Command)
 def build(ctx: Context, output: f.Built = "KR16.fmu", scenario: f.Scene = None,
-          controller: f.Controller = False, no_shim: f.NoShim = False,
+          controller: f.Controller = False, no_shim: f.NoShim = False, native: n.Native = False,
+          fmi: n.Version = "2", arrays: n.Arrays = False, platforms: n.Platforms = "host",
           robot: Robot = None) -> None:  # fmt: skip
-    """Build an FMU of the robot, or of its controller; needs pythonfmu.
+    """Build an FMU of the robot, or of its controller; needs pythonfmu, or --native a compiler.
 
-    $ kr16 fmu build
+    $ kr16 fmu build --native --fmi 3
     $ kr16 fmu build --scenario ptp_16kg -o ptp.fmu
     """
-    f.build(ctx)
+    (n if native else f).build(ctx)
 
 
 @app.command(cls=Command)

@@ -26,7 +26,7 @@ Controller = Annotated[
 ]
 NoShim = Annotated[
     bool,
-    typer.Option("--no-shim", help="Without the C part for Linux programs that are not Python."),
+    typer.Option("--no-shim", help="Without the parts in C: shim for Linux, quicker functions."),
 ]
 Tolerance = Annotated[
     str | None,
@@ -61,7 +61,7 @@ def group() -> None:
 def build(ctx: typer.Context) -> None:
     """Write the FMU and say what it is."""
     from kr16cli.fmi import build as builder
-    from kr16cli.fmi import choices, shim
+    from kr16cli.fmi import choices, compiling, quick
     from kr16cli.fmi.variables import Part
     from kr16cli.simulate.scenario import load_scenario
 
@@ -69,7 +69,7 @@ def build(ctx: typer.Context) -> None:
     with out.Target(p["output"]) as target:
         data = runs.load(ctx)
         scenario = load_scenario(p["scenario"]) if p["scenario"] else None
-        compiler = None if p["no_shim"] else shim.find_compiler()
+        compiler = None if p["no_shim"] else compiling.find_compiler()
         part = Part.CONTROLLER if p["controller"] else Part.ROBOT
         options, notes = choices.options(data, scenario, part, compiler)
         content = builder.build(data, options)
@@ -77,6 +77,11 @@ def build(ctx: typer.Context) -> None:
     if not compiler and not p["no_shim"]:
         notes.append(
             "no C compiler: on Linux, programs that are not Python need LD_PRELOAD; see README"
+        )
+    if compiler and not quick.headers():
+        notes.append(
+            "no Python.h (Debian: python3-dev): the FMU computes in Python alone, "
+            "several times slower"
         )
     batch.warn(notes)
     if p["output"] != "-":

@@ -33,8 +33,9 @@ def model(
 
 
 def poses(
-    ctx: typer.Context, file: checks.PoseFile, robot: o.Robot = None, format_: o.Format = None,
-    json: o.Json = False, junit: checks.Junit = None, output: o.Output = None,
+    ctx: typer.Context, file: checks.PoseFile, si: o.Si = False, robot: o.Robot = None,
+    format_: o.Format = None, json: o.Json = False, junit: checks.Junit = None,
+    output: o.Output = None,
 ) -> None:  # fmt: skip
     """Judge recorded joint angles and poses: residuals, best-fit base and tool, outliers.
 

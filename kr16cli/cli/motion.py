@@ -130,8 +130,9 @@ def simulate(p: Mapping[str, Any], data: RobotData, asked: Scenario) -> None:
         target.write(texts[kind]())
         if isinstance(picture, out.Target):
             from kr16cli.report.motion_figures import motion_pdf
+            from kr16cli.study.bands import of_run
 
-            picture.write(motion_pdf(run, data.joints))
+            picture.write(motion_pdf(run, data.joints, of_run(data, run)))
         if record:
             out.Target(None).write(texts["json" if p["json"] else "table"]())
     batch.warn(answer["warnings"])

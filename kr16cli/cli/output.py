@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 import stat
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from io import BytesIO
 from pathlib import Path
 from types import TracebackType
+from typing import IO, TYPE_CHECKING
 
 from kr16cli.errors import FileError, InputError
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
 FORMATS = ("table", "json", "csv", "npz")
 _OF_SUFFIX = {".json": "json", ".csv": "csv", ".npz": "npz", ".txt": "table"}
@@ -83,18 +89,21 @@ class Target:
 
     def write(self, content: str | bytes) -> None:
         """Write the whole content."""
-        if self._path is None:
-            _to_stdout(content)
-            return
         data = content.encode() if isinstance(content, str) else content
+        self.write_with(lambda out: out.write(data))
+
+    def write_with(self, write: Callable[[IO[bytes]], object]) -> None:
+        """Write what `write` gives to a file, which appears when it is done."""
+        if self._path is None:
+            _to_stdout(write)
+            return
         with _as_file_error(self._path):
-            if self._temporary is None:
-                self._path.write_bytes(data)
-                return
-            self._temporary.write_bytes(data)
-            self._temporary.chmod(_permissions(self._path))
-            self._temporary.replace(self._path)
-            self._temporary = None
+            with (self._temporary or self._path).open("wb") as out:
+                write(out)
+            if self._temporary is not None:
+                self._temporary.chmod(_permissions(self._path))
+                self._temporary.replace(self._path)
+                self._temporary = None
 
 
 def write_file(output: str | Path, make: Callable[[], str | bytes]) -> None:
@@ -137,9 +146,22 @@ def _permissions(path: Path) -> int:
     return 0o666 & ~mask
 
 
-def _to_stdout(content: str | bytes) -> None:
+def _to_stdout(write: Callable[[IO[bytes]], object]) -> None:
     if sys.stdout is None:
         raise FileError("standard output", "is closed; use -o FILE")
     with _as_file_error("standard output"):
-        sys.stdout.write(content if isinstance(content, str) else content.decode())
+        write(_StdoutBytes())
         sys.stdout.flush()
+
+
+class _StdoutBytes(BytesIO):
+    """Standard output that takes UTF-8, in pieces of any length."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._decoder = codecs.getincrementaldecoder("utf-8")()
+
+    def write(self, content: ReadableBuffer) -> int:
+        data = bytes(content)
+        sys.stdout.write(self._decoder.decode(data))
+        return len(data)

@@ -21,8 +21,8 @@ Sources = Annotated[
     typer.Option(
         "--from",
         metavar="FILE",
-        help="Draw these and run nothing: results of kr16 verify --json, a run of kr16 simulate "
-        "(npz), times of kr16 bench --json; may be repeated.",
+        help="Draw these and run no suite: results of kr16 verify --json --figures, a run of kr16 "
+        "simulate (npz). Pages more: kr16 fmu check --json, kr16 bench --json. May be repeated.",
     ),
 ]
 

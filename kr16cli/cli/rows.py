@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from io import BytesIO, StringIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 from kr16cli.cli.values import number
 from kr16cli.errors import FileError, InputError, Kr16Error
 
+if TYPE_CHECKING:
+    from kr16cli.cli.blocks import Block
+
+FEW = 200
+"""Rows up to which a batch is read and answered row by row: NumPy is slower to import."""
+
+NOT_FINITE = "a number is not finite; every number must be finite"
+
+_HEAD = 1 << 20
 _NPZ_MAGIC = b"PK\x03\x04"
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
@@ -42,13 +52,52 @@ class Row(NamedTuple):
 class Batch(NamedTuple):
     """The rows of a file, to be taken once, and what the file is called in messages.
 
-    `expected` is about how many rows there are; `warnings` are about the file as a whole.
+    `expected` is about how many rows there are; `warnings` are about the file as a whole. A long
+    batch has `blocks` too, to be taken in place of `rows`.
     """
 
     name: str
     rows: Iterator[Row]
     expected: int
     warnings: list[str]
+    blocks: Iterator[Block] | None = None
+
+
+class Form(NamedTuple):
+    """How the lines of a CSV file are read, as its header says.
+
+    `taken` says where each group's columns stand, `units_at` where the units of a row.
+    """
+
+    name: str
+    delimiter: str
+    width: int
+    taken: Mapping[str, list[int]]
+    units_at: int | None
+    needed: str
+    si: bool
+
+    @property
+    def decimal_comma(self) -> bool:
+        """Whether a number may have a comma."""
+        return self.delimiter != ","
+
+    def lines(self, text: str, before: int = 0) -> Iterator[list[str]]:
+        """Cells of the lines of a text; `before` lines came before it."""
+        import csv
+
+        source = StringIO(text, newline="")
+        reader = csv.reader(source, delimiter=self.delimiter, skipinitialspace=True)
+        return _lines(reader, self.name, before)
+
+    def rows(self, lines: Iterator[list[str]]) -> Iterator[Row]:
+        """A row for each line."""
+        if self.units_at is not None:
+            lines = _in_units(lines, self.units_at, self.name, self.needed, si=self.si)
+        return (
+            _csv_row(cells, self.width, self.taken, decimal_comma=self.decimal_comma)
+            for cells in lines
+        )
 
 
 def read(source: str, needed: str, optional: Sequence[str] = (), *, si: bool = False) -> Batch:
@@ -65,19 +114,45 @@ def read(source: str, needed: str, optional: Sequence[str] = (), *, si: bool = F
             in other units; of a row's units only when the row is taken.
     """
     name = "stdin" if source == "-" else source
+    with reading(name):
+        # Open beyond this function: a long file is read as its rows are taken.
+        stream: BinaryIO = sys.stdin.buffer if source == "-" else Path(source).open("rb")  # noqa: SIM115
     try:
-        content = sys.stdin.buffer.read() if source == "-" else Path(source).read_bytes()
+        with reading(name):
+            head = stream.read(_HEAD)
+            if head.startswith(_NPZ_MAGIC):
+                head += stream.read()
+        if head.startswith(_NPZ_MAGIC):
+            batch = _npz_batch(head, name, needed, optional, si=si)
+        else:
+            batch = _csv_batch(head, stream, name, needed, optional, si=si)
+    except BaseException:
+        close(stream)
+        raise
+    if len(head) != _HEAD:
+        close(stream)
+    return batch
+
+
+def close(stream: BinaryIO) -> None:
+    """Close a file; stdin is the caller's."""
+    if stream is not getattr(sys.stdin, "buffer", None):
+        stream.close()
+
+
+@contextmanager
+def reading(name: str) -> Iterator[None]:
+    """Turns an error of the operating system into a FileError about what is read."""
+    try:
+        yield
     except IsADirectoryError:
         raise FileError(name, "is a directory; name a CSV or npz file") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(name, f"cannot be read: {reason}") from None
-    if content.startswith(_NPZ_MAGIC):
-        return _npz_batch(content, name, needed, optional, si=si)
-    return _csv_batch(content, name, needed, optional, si=si)
 
 
-def _check_units(name: str, unit: str, group: str, *, si: bool) -> None:
+def check_units(name: str, unit: str, group: str, *, si: bool) -> None:
     """FileError where a file says that a group's numbers are in other units than are read."""
     said = set(re.findall("[a-z]+", unit.lower()))
     if group != "pose":
@@ -90,37 +165,67 @@ def _check_units(name: str, unit: str, group: str, *, si: bool) -> None:
     raise FileError(name, f"its numbers are in {unit}, but {reads} are read; {do}")
 
 
-def _csv_batch(
-    content: bytes, name: str, needed: str, optional: Sequence[str], *, si: bool
-) -> Batch:
-    import csv
-
+def decoded(content: bytes, name: str, before: int = 0) -> str:
+    """The text of bytes, `before` bytes from the start; FileError where it is none."""
     try:
-        text = content.decode("utf-8-sig")
+        return content.decode("utf-8" if before else "utf-8-sig")
     except UnicodeDecodeError as error:
-        raise FileError(name, f"not UTF-8 text at byte {error.start}, and no npz") from None
+        at = before + error.start
+        raise FileError(name, f"not UTF-8 text at byte {at}, and no npz") from None
+
+
+def _csv_batch(
+    head: bytes, rest: BinaryIO, name: str, needed: str, optional: Sequence[str], *, si: bool
+) -> Batch:
+    open_end = len(head) == _HEAD
+    long = open_end or head.count(b"\n") > FEW
+    if long and _needs_care(head):
+        long = open_end = False
+        with reading(name):
+            head += rest.read()
+        close(rest)
+    text = decoded(head[: head.rfind(b"\n") + 1] if open_end else head, name)
     first = next((line for line in text.splitlines() if line.strip()), "")
     if not first:
         raise FileError(name, f"is empty; it needs a header {','.join(GROUPS[needed])}")
     delimiter = next((mark for mark in (";", "\t") if mark in first), ",")
-    lines = _lines(
-        csv.reader(StringIO(text, newline=""), delimiter=delimiter, skipinitialspace=True), name
-    )
+    form = Form(name, delimiter, 0, {}, None, needed, si)
+    lines = form.lines(text)
     header, column_units = _header(next(lines))
     taken = _columns(header, name, needed, optional)
     for group, columns in taken.items():
         for column in columns:
-            _check_units(name, column_units[column], group, si=si)
-    if "units" in header:
-        lines = _in_units(lines, header.index("units"), name, needed, si=si)
+            check_units(name, column_units[column], group, si=si)
+    units_at = header.index("units") if "units" in header else None
+    form = form._replace(width=len(header), taken=taken, units_at=units_at)
     extra = [cell for cell in header if cell and cell not in _OWN]
     warnings = [f"{name}: columns not used: {', '.join(extra)}"] if extra else []
-    comma = delimiter != ","
-    rows = (_csv_row(cells, len(header), taken, decimal_comma=comma) for cells in lines)
-    return Batch(name, rows, text.count("\n"), warnings)
+    if not long:
+        return Batch(name, form.rows(lines), text.count("\n"), warnings)
+    from kr16cli.cli import blocks
+
+    before = next(i for i, line in enumerate(text.split("\n"), 1) if line.strip())
+    start = sum(len(line) + 1 for line in head.split(b"\n", before)[:before])
+    more = rest if open_end else BytesIO()
+    found = blocks.csv_blocks(form, head[start:], more, (start, before))
+    expected = text.count("\n")
+    with suppress(OSError):  # not of a pipe
+        if open_end:
+            expected = expected * os.fstat(rest.fileno()).st_size // len(head)
+    return _in_blocks(name, found, expected, warnings)
 
 
-def _lines(reader: Any, name: str) -> Iterator[list[str]]:
+def _needs_care(head: bytes) -> bool:
+    """Whether lines end in CR alone, or the header may go over several lines."""
+    first = head.lstrip().partition(b"\n")[0]
+    return b"\r" in head.replace(b"\r\n", b"").rstrip(b"\r") or first.count(b'"') % 2 == 1
+
+
+def _in_blocks(name: str, found: Iterator[Block], expected: int, warnings: list[str]) -> Batch:
+    return Batch(name, (row for one in found for row in one.rows()), expected, warnings, found)
+
+
+def _lines(reader: Any, name: str, before: int = 0) -> Iterator[list[str]]:
     """Lines of a CSV file that hold more than blanks; FileError where it is none."""
     import csv
 
@@ -130,7 +235,8 @@ def _lines(reader: Any, name: str) -> Iterator[list[str]]:
             if not blank or "".join(line).strip():
                 yield line
     except csv.Error as error:
-        raise FileError(name, f"line {reader.line_num}: no CSV: {error}") from None
+        at = before + reader.line_num
+        raise FileError(name, f"line {at}: no CSV: {error}") from None
 
 
 def _header(cells: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -150,7 +256,7 @@ def _in_units(
     for cells in lines:
         unit = cells[at] if at < len(cells) else ""
         if unit not in sound:
-            _check_units(name, unit, needed, si=si)
+            check_units(name, unit, needed, si=si)
             sound.add(unit)
         yield cells
 
@@ -222,7 +328,7 @@ def _npz_batch(
         raise FileError(name, f"lacks the array {keys[needed]}; found: {found}")
     for group in arrays:
         if group != "pose":  # the 4x4 transforms are in m, whatever is typed
-            _check_units(name, units.get(group, ""), group, si=si)
+            check_units(name, units.get(group, ""), group, si=si)
     for group, array in arrays.items():
         if array.dtype.kind not in "fiu":
             key = keys.get(group, group)
@@ -233,12 +339,17 @@ def _npz_batch(
             raise FileError(
                 name, f"{keys.get(group, group)} has shape {array.shape}; expected (n, {wanted})"
             )
-        arrays[group] = array.astype(float).reshape(-1, *shape)
+        arrays[group] = array.astype(float, copy=False).reshape(-1, *shape)
     count = len(arrays[needed])
     for group, array in arrays.items():
         if len(array) != count:
             raise FileError(name, f"{group} has {len(array)} rows, {needed} has {count}")
-    return Batch(name, _array_rows(arrays, count, needed), count, [])
+    names = {"pose": "T"} if needed == "pose" else {}
+    arrays = {names.get(group, group): array for group, array in arrays.items()}
+    from kr16cli.cli import blocks
+
+    batch = _in_blocks(name, blocks.array_blocks(arrays), count, [])
+    return batch if count > FEW else batch._replace(blocks=None)
 
 
 def _npz_units(archive: Mapping[str, Any]) -> dict[str, str]:
@@ -252,20 +363,6 @@ def _npz_units(archive: Mapping[str, Any]) -> dict[str, str]:
             about = about["units"] if key == "metadata" and "units" in about else about
             found |= {name: str(unit) for name, unit in about.items()}
     return found
-
-
-def _array_rows(arrays: Mapping[str, Any], count: int, needed: str) -> Iterator[Row]:
-    import numpy as np
-
-    finite = np.ones(count, dtype=bool)
-    for array in arrays.values():
-        finite &= np.isfinite(array).reshape(count, -1).all(axis=1)
-    names = {"pose": "T"} if needed == "pose" else {}
-    for i in range(count):
-        if finite[i]:
-            yield Row({names.get(key, key): array[i].tolist() for key, array in arrays.items()})
-        else:
-            yield Row({}, "a number is not finite; every number must be finite")
 
 
 def stdin_is_terminal() -> bool:

@@ -43,7 +43,7 @@ def simulate(
     """Simulate a motion: a scenario file, a shipped scenario, or options.
 
     $ kr16 simulate free_swing -o swing.npz
-    $ kr16 simulate step_disturbance --duration 0.6 -o push.csv
+    $ kr16 simulate step_disturbance --duration 0.6 -o push.csv --plot push.pdf
     $ kr16 simulate --q 0 -60 60 0 30 0 --duration 0.5 --torque gravity --json
 
     An option replaces the scenario's value. CSV and npz hold every sample, in SI units; the

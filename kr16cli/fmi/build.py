@@ -5,23 +5,23 @@ from __future__ import annotations
 import importlib
 import io
 import os
-import shutil
 import sys
 import tempfile
 import time
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import lru_cache
 from html import escape
 from importlib import metadata
 from pathlib import Path
 from types import ModuleType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import kr16cli
 from kr16cli.assets import asset
-from kr16cli.errors import InputError, MissingPartError
-from kr16cli.fmi import shim, stage, straight
+from kr16cli.errors import CheckFailedError, InputError, MissingPartError
+from kr16cli.fmi import quick, shim, stage, written
 from kr16cli.fmi.cargo import Cargo
 from kr16cli.fmi.description import guid
 from kr16cli.fmi.variables import TYPES, Part, Start, Variable, table
@@ -36,8 +36,9 @@ _OLDEST = (1980, 1, 1, 0, 0, 0)
 class Options(NamedTuple):
     """What an FMU is made of.
 
-    `stop` and `step` (s) are the default experiment's. `compiler` is a C compiler for the shim
-    that lets programs other than Python load the FMU on Linux, or None for no shim.
+    `stop` and `step` (s) are the default experiment's. `compiler` is a C compiler for two parts
+    that serve on Linux: the shim, which lets programs other than Python load the FMU, and the
+    compiled functions, which make its steps several times quicker. None leaves them out.
     """
 
     start: Start
@@ -53,7 +54,7 @@ def build(data: RobotData, options: Options) -> bytes:
 
     Args:
         data: the robot, with inertial data.
-        options: start values, default experiment, shim.
+        options: start values, default experiment, compiled parts.
 
     Returns:
         The bytes of the .fmu file. With SOURCE_DATE_EPOCH set, equal input gives equal bytes.
@@ -66,26 +67,31 @@ def build(data: RobotData, options: Options) -> bytes:
     if not data.links:
         raise InputError(f"{data.name} ({data.path}) has no inertial data; an FMU needs six links")
     _epoch()
-    try:
-        builder = importlib.import_module("pythonfmu.builder").FmuBuilder
-    except ImportError:
-        raise MissingPartError("pythonfmu", "fmu") from None
+    home = _home()
     cargo = Cargo(_about(data, options), table(data, options.start, options.part), data)
-    slave = asset("fmu/kr16_slave.py").read_text(encoding="utf-8")
-    files = stage.contents(cargo, straight.source(data), slave)
+    slave, pages = _shipped()
+    files = stage.contents(cargo, written.python(), slave)
     library = shim.compiled(options.compiler) if options.compiler else b""
+    module = quick.compiled(options.compiler) if options.compiler else b""
     version = metadata.version("pythonfmu")
-    digest = stage.identity(files, version.encode(), library)
+    digest = stage.identity(files, version.encode(), library, module)
     with tempfile.TemporaryDirectory(prefix="kr16_fmu_") as folder:
         here = Path(folder)
-        script = stage.stage(here / "resources", files, digest)
-        documentation = _documentation(here / "documentation", cargo, digest)
+        script = stage.stage(
+            here / "resources", files, digest, {quick.MODULE: module} if module else {}
+        )
+        documentation = _documentation(here / "documentation", pages, cargo, digest)
         made = here / f"{MODEL}.fmu"
-        with _as_before(script):
+        with _as_before(script), _builder(home) as builder:
             builder.build_FMU(
                 script, dest=made, project_files=[stage.package_of(script)],
                 documentation_folder=documentation,
             )  # fmt: skip
+            if module and f"{stage.package_of(script).name}.quick" not in sys.modules:
+                raise CheckFailedError(
+                    "this Python cannot load the functions that were compiled for it; "
+                    "give --no-shim for an FMU without compiled parts"
+                )
         return _packed(made, library, guid(digest))
 
 
@@ -108,32 +114,80 @@ def _about(data: RobotData, options: Options) -> dict[str, object]:
     }
 
 
+def _home() -> Path:
+    """Where pythonfmu is installed."""
+    try:
+        found = metadata.distribution("pythonfmu").locate_file("pythonfmu")
+    except metadata.PackageNotFoundError:
+        raise MissingPartError("pythonfmu", "fmu") from None
+    return Path(str(found)).resolve()
+
+
+@contextmanager
+def _builder(home: Path) -> Iterator[Any]:
+    """pythonfmu's builder as it is installed.
+
+    An FMU that this process hosts may have brought its own copy of pythonfmu, without the libraries
+    and from a folder that can go at any time.
+    """
+    known = sys.modules.get("pythonfmu")
+    foreign = known is not None and Path(str(known.__file__)).resolve().parent != home
+    path, brought = list(sys.path), _taken("pythonfmu") if foreign else {}
+    sys.path[:] = [p for p in path if Path(p).resolve() == home.parent or not _has_copy(p)]
+    try:
+        try:
+            module = importlib.import_module("pythonfmu.builder")
+        except ImportError:
+            raise MissingPartError("pythonfmu", "fmu") from None
+        yield module.FmuBuilder
+    finally:
+        sys.path[:] = path
+        if foreign:
+            _taken("pythonfmu")
+            sys.modules.update(brought)
+
+
+def _has_copy(folder: str) -> bool:
+    return (Path(folder) / "pythonfmu").is_dir()
+
+
 @contextmanager
 def _as_before(script: Path) -> Iterator[None]:
     """Leaves Python's path and modules as they were; the builder imports the script.
 
     The same build may be in the process already, hosted from a folder that is gone.
     """
-    path, hosted = list(sys.path), _taken(script)
+    roots = (stage.package_of(script).name, script.stem)
+    path, hosted = list(sys.path), _taken(*roots)
     sys.path.insert(0, str(script.parent))
     try:
         yield
     finally:
         sys.path[:] = path
-        _taken(script)
+        _taken(*roots)
         sys.modules.update(hosted)
 
 
-def _taken(script: Path) -> dict[str, ModuleType]:
-    """The modules of a staged script and its package, taken out of Python's table."""
-    roots = (stage.package_of(script).name, script.stem)
+def _taken(*roots: str) -> dict[str, ModuleType]:
+    """Modules and what is in them, taken out of Python's table."""
     names = [name for name in sys.modules if name.split(".")[0] in roots]
     return {name: sys.modules.pop(name) for name in names}
 
 
-def _documentation(folder: Path, cargo: Cargo, digest: str) -> Path:
+@lru_cache(maxsize=1)
+def _shipped() -> tuple[str, Mapping[str, bytes]]:
+    """Text of the slave, files of the documentation; read once, as `stage.closure` is."""
+    root = asset("fmu/documentation")
+    files = sorted(path for path in root.rglob("*") if path.is_file())
+    pages = {path.relative_to(root).as_posix(): path.read_bytes() for path in files}
+    return asset("fmu/kr16_slave.py").read_text(encoding="utf-8"), pages
+
+
+def _documentation(folder: Path, pages: Mapping[str, bytes], cargo: Cargo, digest: str) -> Path:
     """The FMU's documentation folder: a page with the variables, and licences."""
-    shutil.copytree(asset("fmu/documentation"), folder)
+    for name, content in pages.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
     page = folder / "index.html"
     texts = {"identity": digest, **{key: str(value) for key, value in cargo.about.items()}}
     text = page.read_text(encoding="utf-8")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import platform
 from collections.abc import Mapping, Sequence
+from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -195,6 +197,10 @@ def envelope(fmu: Fmu, report: Report) -> dict[str, Any]:
         "units": {d.group: d.unit for d in report.deviations},
         "input": {"file": fmu.path},
         "result": {
+            "fmi_version": fmu.attributes["fmiVersion"],
+            "interface": play.interface(fmu),
+            "host": f"FMPy {metadata.version('fmpy')}",
+            "platform": f"{platform.system()} {platform.machine()}",
             "passed": not report.problems,
             "problems": report.problems,
             "deviations": [

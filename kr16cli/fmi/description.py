@@ -8,11 +8,12 @@ from xml.etree.ElementTree import Element, SubElement
 
 from kr16cli.fmi.variables import TYPES, UNITS, Type, Unit, Variable, dependencies
 
-_LOG = {
+LOG = {
     "logStatusWarning": "Joints beyond their limits",
     "logStatusError": "Why a call failed",
     "logAll": "All messages",
 }
+"""Log categories."""
 _CAN = {
     "needsExecutionTool": True,  # Python is not in the FMU
     "canHandleVariableCommunicationStepSize": True,
@@ -51,16 +52,16 @@ def model_description(
         "numberOfEventIndicators": "0",
     })  # fmt: skip
     SubElement(root, "CoSimulation", {
-        "modelIdentifier": name, **{key: _word(value) for key, value in _CAN.items()}
+        "modelIdentifier": name, **{key: word(value) for key, value in _CAN.items()}
     })  # fmt: skip
     units = SubElement(root, "UnitDefinitions")
     for unit, parts in UNITS.items():
-        units.append(_unit(unit, parts))
+        units.append(unit_element(unit, parts))
     types = SubElement(root, "TypeDefinitions")
     for key, kind in TYPES.items():
         types.append(_type(key, kind))
     categories = SubElement(root, "LogCategories")
-    for category, text in _LOG.items():
+    for category, text in LOG.items():
         SubElement(categories, "Category", {"name": category, "description": text})
     SubElement(root, "DefaultExperiment", {
         "startTime": "0.0", "stopTime": repr(float(about["stop"])),
@@ -75,16 +76,17 @@ def model_description(
         for place, variable in enumerate(variables, 1):
             if variable.causality == "output":
                 known = dependencies(variables, variable.name, start=start)
-                unknowns.append(_unknown(place, known))
+                unknowns.append(unknown(place, known))
     return root
 
 
-def _word(value: Any) -> str:
+def word(value: Any) -> str:
     """A value as XML has it: true, a number in its shortest exact form."""
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
-def _unit(name: str, unit: Unit) -> Element:
+def unit_element(name: str, unit: Unit) -> Element:
+    """A unit's definition."""
     element = Element("Unit", {"name": name})
     exponents = {key: getattr(unit, key) for key in ("kg", "m", "s", "rad")}
     SubElement(element, "BaseUnit", {k: str(n) for k, n in exponents.items() if n})
@@ -98,14 +100,15 @@ def _type(name: str, kind: Type) -> Element:
     own = SubElement(element, kind.base)
     if kind.quantity:
         own.set("quantity", kind.quantity)
-    for key, value in _units(kind).items():
+    for key, value in units_of(kind).items():
         own.set(key, value)
     if kind.nominal is not None:
         own.set("nominal", repr(kind.nominal))
     return element
 
 
-def _units(kind: Type) -> dict[str, str]:
+def units_of(kind: Type) -> dict[str, str]:
+    """Attributes that name the unit and display unit of a type."""
     display = UNITS[kind.unit].display if kind.unit else ""
     found = {"unit": kind.unit, "displayUnit": display}
     return {key: value for key, value in found.items() if value}
@@ -124,17 +127,18 @@ def _variable(place: int, variable: Variable) -> Element:
     kind = TYPES[variable.type]
     own = SubElement(element, kind.base, {"declaredType": variable.type})
     if kind.base == "Real":
-        for key, value in _units(kind).items():
+        for key, value in units_of(kind).items():
             own.set(key, value)
     for key, bound in (("min", variable.low), ("max", variable.high)):
         if bound is not None:
             own.set(key, repr(bound if kind.base == "Real" else int(bound)))
     if variable.start is not None:
-        own.set("start", _word(variable.start))
+        own.set("start", word(variable.start))
     return element
 
 
-def _unknown(place: int, known: Sequence[int]) -> Element:
+def unknown(place: int, known: Sequence[int]) -> Element:
+    """An unknown of the model structure with the places of what it depends on."""
     attributes = {"index": str(place), "dependencies": " ".join(map(str, known))}
     if known:
         attributes["dependenciesKind"] = " ".join(["dependent"] * len(known))

@@ -21,7 +21,11 @@ INSTANTIATED, INITIALIZING, STEPPING, TERMINATED, FAILED = (
 )  # fmt: skip
 MakeArm = Callable[..., Arm]
 
+_BASES = ("Real", "Integer", "Boolean", "String")
 _STATE_SCHEMA = "kr16.fmu_state/1"
+_REMEMBERED = 256
+"""Lists of references, as a host asks for them, that need no check again."""
+
 _SLACK = 1e-9
 """Relative difference of two times that is rounding of a host's clock."""
 
@@ -65,20 +69,32 @@ class Machine:
         self._fresh: set[str] = {""}
         self._settings: Settings | None = None
         self._beyond: set[str] = set()
+        self._asked: dict[tuple[tuple[int, ...], Sequence[str]], frozenset[str]] = {}
 
     # Values ---------------------------------------------------------------------------------
 
-    def get(self, places: Sequence[int]) -> list[Any]:
-        """Values by reference; outputs are computed when they are asked for."""
-        if not all(0 <= place < len(self.variables) for place in places):
-            self._unknown(places)
-        groups = {self._groups[place] for place in places}
+    def get(self, places: Sequence[int], bases: Sequence[str] = _BASES) -> list[Any]:
+        """Values by reference, of types of the given bases.
+
+        Outputs are computed when they are asked for.
+        """
+        asked = (tuple(places), bases)
+        groups = self._asked.get(asked)
+        if groups is None:
+            self._must_be_of(places, bases)
+            if len(self._asked) >= _REMEMBERED:
+                self._asked.clear()
+            groups = self._asked[asked] = frozenset(self._groups[place] for place in places)
         for group in groups - self._fresh:
             self._compute(group)
-        return [self._values[place] for place in places]
+        values = self._values
+        return [values[place] for place in places]
 
-    def set(self, places: Sequence[int], values: Sequence[Any]) -> None:
-        """Set inputs and parameters; all or, with an error, none."""
+    def set(
+        self, places: Sequence[int], values: Sequence[Any], bases: Sequence[str] = _BASES
+    ) -> None:
+        """Set inputs and parameters, of types of the given bases; all or, with an error, none."""
+        self._must_be_of(places, bases)
         checked = [
             (place, self._checked(place, value))
             for place, value in zip(places, values, strict=True)
@@ -91,19 +107,17 @@ class Machine:
             self._settings.inputs_changed()
         self._fresh = {""}
 
-    def must_be_of(self, places: Sequence[int], bases: Sequence[str]) -> None:
+    def _must_be_of(self, places: Sequence[int], bases: Sequence[str]) -> None:
         """Refuse references of variables whose type is not of one of the bases."""
         for place in places:
             if not 0 <= place < len(self.variables):
-                self._unknown([place])
+                self._unknown(place)
             variable = self.variables[place]
             if variable.base not in bases:
                 raise InputError(f"{variable.name} is of type {variable.base}, not {bases[0]}")
 
     def _checked(self, place: int, value: Any) -> Any:
         """The value as the variable's type has it."""
-        if not 0 <= place < len(self.variables):
-            self._unknown([place])
         variable = self.variables[place]
         if self.phase in (TERMINATED, FAILED):
             raise InputError(f"{variable.name} cannot be set: the instance is {self.phase}; reset")
@@ -135,12 +149,9 @@ class Machine:
         unit = TYPES[variable.type].unit
         raise InputError(f"{variable.name} = {value:g} {unit}: must be {low:g} to {high:g}")
 
-    def _unknown(self, places: Sequence[int]) -> NoReturn:
-        known = len(self.variables)
-        bad = next(p for p in places if not 0 <= p < known)
-        raise InputError(
-            f"no variable has the value reference {bad}; they go from 0 to {known - 1}"
-        )
+    def _unknown(self, place: int) -> NoReturn:
+        last = len(self.variables) - 1
+        raise InputError(f"no variable has the value reference {place}; they go from 0 to {last}")
 
     # Phases ---------------------------------------------------------------------------------
 

@@ -59,9 +59,13 @@ def play(
     return answer["columns"], answer["warnings"]
 
 
+def interface(fmu: Fmu) -> str:
+    """The kind of FMU it is run as: co-simulation where it offers that, else its first."""
+    return "co-simulation" if "co-simulation" in fmu.kinds else "".join(fmu.kinds[:1])
+
+
 def _kind(fmu: Fmu) -> str:
-    kind = "co-simulation" if "co-simulation" in fmu.kinds else "".join(fmu.kinds[:1])
-    return "".join(part.capitalize() for part in kind.split("-"))
+    return "".join(part.capitalize() for part in interface(fmu).split("-"))
 
 
 def _typed(fmu: Fmu, values: Mapping[str, float]) -> dict[str, Any]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from kr16cli.fmi.stiff import rosenbrock_step
 from kr16cli.fmi.variables import COM, GRAVITY, INERTIA, six
+from kr16cli.fmi.written_arm import WrittenArm, WrittenTaskControl
 from kr16cli.robot import JointData, Payload, RobotData
 from kr16cli.robot_rules import checked_payload
 from kr16cli.simulate.controllers import ComputedTorque, GravityCompensation, GravityPD, Zero, gains
@@ -16,12 +18,19 @@ from kr16cli.simulate.plant import Limits, Plant, Wrench
 from kr16cli.simulate.task_control import TaskComputedTorque
 from kr16cli.single import Arm
 
-_METHODS: dict[int, Callable[[Plant, float, Sequence[float], float], list[float]]] = {
-    2: lambda plant, t, state, h: rk4_step(plant.rates, t, state, h),
-    3: lambda plant, t, state, h: euler_step(plant.rates, t, state, h),
-    4: rosenbrock_step,
-}
-"""Steps by the number of solver.method; 1 chooses among them."""
+_Step = Callable[[Plant, float, Sequence[float], float], list[float]]
+
+
+def _method(number: int, arm: Arm) -> _Step:
+    """The step of the number of solver.method."""
+    if number == 2:
+        return lambda plant, t, state, h: rk4_step(plant.rates, t, state, h)
+    if number == 3:
+        return lambda plant, t, state, h: euler_step(plant.rates, t, state, h)
+    if isinstance(arm, WrittenArm):
+        return partial(rosenbrock_step, solve=arm.solve)
+    return rosenbrock_step
+
 
 _NOTHING = (0.0,) * 6
 
@@ -80,7 +89,8 @@ class Settings:
         nothing = Drive(Zero(), Setpoint(self.arm, _NOTHING), _NOTHING)
         self.plant = Plant(self.arm, nothing, limits=limits)
         method = values.get("solver.method", 1)
-        self._advance = _METHODS[(4 if drives or contact else 2) if method == 1 else method]
+        chosen = (4 if drives or contact else 2) if method == 1 else method
+        self._advance = _method(chosen, self.arm)
         self.stale = True
 
     def advance(self, time: float, state: Sequence[float], h: float) -> list[float]:
@@ -123,5 +133,7 @@ def _controller(
         return GravityCompensation(arm)
     if mode == 3:
         return GravityPD.tuned(arm, row("q_start"), frequency, damping)
-    kind = ComputedTorque if mode == 4 else TaskComputedTorque
+    if mode == 4:
+        return ComputedTorque(arm, *gains(frequency, damping))
+    kind = WrittenTaskControl if isinstance(arm, WrittenArm) else TaskComputedTorque
     return kind(arm, *gains(frequency, damping))

@@ -7,9 +7,10 @@ import json
 from collections.abc import Callable
 from functools import lru_cache, partial
 from importlib import import_module
+from types import ModuleType
 from typing import Any
 
-from kr16cli.fmi import cargo, straight_arm
+from kr16cli.fmi import cargo, written_arm
 from kr16cli.fmi.machine import Machine
 from kr16cli.fmi.variables import Part, Variable
 
@@ -20,9 +21,17 @@ Warn = Callable[[str], None]
 def _loaded() -> tuple[cargo.Cargo, dict[str, Any], str]:
     """Cargo, written-out functions and identity of the package this module lies in."""
     package = __name__.partition(".")[0]
-    written = import_module(f"{package}.written")
-    functions = {name: getattr(written, name) for name in straight_arm.NAMES}
+    module = _functions(package)
+    functions = {name: getattr(module, name) for name in written_arm.NAMES}
     return cargo.own(package), functions, import_module(package).IDENTITY
+
+
+def _functions(package: str) -> ModuleType:
+    """The written-out functions: compiled where this machine can load them, else in Python."""
+    try:
+        return import_module(f"{package}.quick")
+    except ImportError:
+        return import_module(f"{package}.functions")
 
 
 def variables() -> tuple[Variable, ...]:
@@ -39,7 +48,7 @@ def about() -> tuple[dict[str, Any], str]:
 def new_machine(warn: Warn) -> Machine:
     """A new instance of this FMU's robot."""
     freight, functions, identity = _loaded()
-    make_arm = partial(straight_arm.StraightArm, functions=functions)
+    make_arm = partial(written_arm.WrittenArm, functions=functions)
     part = Part(freight.about["part"])
     return Machine(freight.variables, freight.data, make_arm, part, identity, warn)
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 import ast
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
+from types import MappingProxyType
 
 import kr16cli
 from kr16cli.errors import FileError
@@ -17,7 +19,7 @@ from kr16cli.fmi import cargo as freight
 
 PACKAGE = "kr16cli"
 ENTRIES = ("kr16cli.fmi.slave_side", "kr16cli.fmi.description")
-WRITTEN = "written.py"
+WRITTEN = "functions.py"
 _ENTRY = '''"""Names the slave; pythonfmu's wrapper runs this text anew for each instance."""
 
 from {package}.fmi.slave_side import keep
@@ -30,8 +32,11 @@ keep(globals())
 _ROOT = Path(kr16cli.__file__).resolve().parent
 
 
-def closure(entries: Sequence[str] = ENTRIES) -> dict[str, str]:
+@lru_cache(maxsize=2)
+def closure(entries: Sequence[str] = ENTRIES) -> Mapping[str, str]:
     """Sources of modules and of all of the package that they import.
+
+    They are read once in a process, so that its builds agree whatever happens to the files.
 
     Returns:
         Source by path below the package: {"model/chain.py": ...}, sorted.
@@ -52,7 +57,7 @@ def closure(entries: Sequence[str] = ENTRIES) -> dict[str, str]:
         waiting += _imports(found[key], key)
         waiting += [f"{PACKAGE}.{parent.as_posix().replace('/', '.')}"
                     for parent in Path(key).parents if parent != Path()]  # fmt: skip
-    return dict(sorted(found.items()))
+    return MappingProxyType(dict(sorted(found.items())))
 
 
 def _path(module: str) -> Path | None:
@@ -116,13 +121,14 @@ def contents(cargo: freight.Cargo, written: str, slave: str) -> dict[str, str]:
     }  # fmt: skip
 
 
-def stage(folder: Path, files: Mapping[str, str], digest: str) -> Path:
+def stage(folder: Path, files: Mapping[str, str], digest: str, more: Mapping[str, bytes]) -> Path:
     """Write the private package and the script that names the slave into a folder.
 
     Args:
         folder: where they go.
         files: what `contents` gave.
         digest: the build's identity.
+        more: files of the package that are no text.
 
     Returns:
         The script; the package lies beside it.
@@ -136,6 +142,8 @@ def stage(folder: Path, files: Mapping[str, str], digest: str) -> Path:
         path = folder / package / key
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes((renamed(text, package) if key.endswith(".py") else text).encode())
+    for key, content in more.items():
+        (folder / package / key).write_bytes(content)
     script = folder / f"kr16_slave_{digest[:16]}.py"
     script.write_bytes(_ENTRY.format(package=package).encode())
     return script

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from kr16cli.model.dynamics import solve_symmetric
-from kr16cli.model.scalars import matvec
 from kr16cli.simulate.plant import Plant
 
 GAMMA = 1.0 - math.sqrt(0.5)
 """Makes the method L-stable: what is infinitely stiff is gone after one step."""
 
-_STEP = 1e-6
+STEP = 1e-6
 """Of differences (rad, rad/s): small beside the speed friction is regularised with."""
 
 Six = Sequence[float]
+Solve = Callable[[list[list[float]], Sequence[float]], list[float]]
 
 
-def rosenbrock_step(plant: Plant, t: float, state: Sequence[float], h: float) -> list[float]:
+def rosenbrock_step(
+    plant: Plant, t: float, state: Sequence[float], h: float, solve: Solve = solve_symmetric
+) -> list[float]:
     """One step of ROS2, order 2 whatever the Jacobian (Verwer et al. 1999, a W-method).
 
     (1 - g h A) k1 = F(y), (1 - g h A) k2 = F(y + h k1) - 2 k1, y' = y + h (3 k1 + k2) / 2. Of
@@ -31,6 +33,7 @@ def rosenbrock_step(plant: Plant, t: float, state: Sequence[float], h: float) ->
         t: time, s.
         state: q (rad) and qd (rad/s).
         h: step, s.
+        solve: x of A x = b for a symmetric positive definite matrix.
 
     Returns:
         The state at t + h.
@@ -43,10 +46,11 @@ def rosenbrock_step(plant: Plant, t: float, state: Sequence[float], h: float) ->
         left[i][i] += gh * (D[i] + gh * K[i])
 
     def solved(r: Sequence[float]) -> list[float]:
-        pushed = matvec(M, r[6:])
-        right = [m - gh * k * v for m, k, v in zip(pushed, K, r[:6], strict=True)]
-        k_v = solve_symmetric(left, right)
-        return [*(v + gh * w for v, w in zip(r[:6], k_v, strict=True)), *k_v]
+        u, v, w, x, y, z = r[6:]
+        pushed = [a * u + b * v + c * w + d * x + e * y + f * z for a, b, c, d, e, f in M]
+        right = [m - gh * k * s for m, k, s in zip(pushed, K, r[:6], strict=True)]
+        k_v = solve(left, right)
+        return [*[s + gh * k for s, k in zip(r[:6], k_v, strict=True)], *k_v]
 
     k1 = solved(plant.rates(t, state))
     there = plant.rates(t + h, [y + h * k for y, k in zip(state, k1, strict=True)])
@@ -56,15 +60,19 @@ def rosenbrock_step(plant: Plant, t: float, state: Sequence[float], h: float) ->
 
 def _stiffness(plant: Plant, q: Six, qd: Six) -> tuple[list[float], list[float]]:
     """Diagonals of the stops' stiffness K (N m/rad) and of all damping D (N m s/rad)."""
+    stops = plant.limits.joint == "contact"
 
     def resisting(dq: float, dqd: float) -> list[float]:
-        angles, rates = [v + dq for v in q], [v + dqd for v in qd]
-        pairs = zip(plant.arm.friction(rates), plant.contact(angles, rates), strict=True)
-        return [friction - contact for friction, contact in pairs]
+        rates = [v + dqd for v in qd]
+        friction = plant.arm.friction(rates)
+        if not stops:
+            return friction
+        contact = plant.contact([v + dq for v in q], rates)
+        return [a - b for a, b in zip(friction, contact, strict=True)]
 
     def slope(dq: float, dqd: float) -> list[float]:
         pairs = zip(resisting(dq, dqd), resisting(-dq, -dqd), strict=True)
-        return [max(0.0, (a - b) / (2.0 * _STEP)) for a, b in pairs]
+        return [max(0.0, (a - b) / (2.0 * STEP)) for a, b in pairs]
 
     # Each joint resists by its own angle and speed alone, so all six slopes come at once.
-    return slope(_STEP, 0.0), slope(0.0, _STEP)
+    return slope(STEP, 0.0) if stops else [0.0] * 6, slope(0.0, STEP)

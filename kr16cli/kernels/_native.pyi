@@ -1,6 +1,7 @@
 """Compiled kernels of the model (native/module.c)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,25 @@ class Kernel:
     ) -> None: ...
     def __call__(self, *inputs_out_threads: object) -> _Array | None: ...
 
+class Method:
+    def __init__(self, kernel: Kernel, required: int, fallback: Callable[..., Any], /) -> None: ...
+    def __call__(self, *inputs: object, **options: object) -> Any: ...
+
 def sincos(x: _Array, sine: _Array, cosine: _Array, /) -> None: ...
 def atan2(y: _Array, x: _Array, angle: _Array, /) -> None: ...
 def operations() -> dict[str, int]: ...
+def multiply_adds(rounds: int, /) -> tuple[float, float]: ...
+def touch(array: _Array, write: bool, /) -> float | None: ...
+def rollout(
+    method: int,
+    kernel: str,
+    own_kernel: str,
+    inputs: tuple[_Array, _Array, _Array, _Array | None, _Array],
+    results: tuple[_Array, _Array, npt.NDArray[np.int64]],
+    in_flange: bool,
+    samples: int,
+    settings: tuple[float, float, float, float, float],
+    max_steps: int,
+    threads: int,
+    /,
+) -> None: ...

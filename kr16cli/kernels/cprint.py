@@ -11,15 +11,17 @@ _CALLS = {"sqrt": "sqrt", "atan2": "kr16_atan2"}
 _INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<="}
 
 
-def kernel(name: str, results: Sequence[Node]) -> str:
+def kernel(name: str, results: Sequence[Node], *, own: bool = False) -> str:
     """A C function that maps input rows x[row*TILE + i] to result rows y, for every lane i.
 
-    What depends on parameters p alone is computed once, before the loop.
+    What depends on parameters p alone is computed once, before the loop. With `own` parameters
+    are rows as well, p[index*TILE + i]: each lane has its own.
     """
     nodes = needed(results)
-    fixed = _independent_of_inputs(nodes)
+    fixed = _lane_independent(nodes, own=own)
     head = [_statement(n, "    ") for n in nodes if n.number in fixed and n.op != "constant"]
-    body = [_statement(n, "        ") for n in nodes if n.number not in fixed]
+    lane = "TILE + i" if own else ""
+    body = [_statement(n, "        ", lane) for n in nodes if n.number not in fixed]
     store = [f"        y[{i} * TILE + i] = {_name(node)};" for i, node in enumerate(results)]
     return "\n".join(
         [
@@ -41,16 +43,15 @@ def kernel(name: str, results: Sequence[Node]) -> str:
 def operations(results: Sequence[Node]) -> int:
     """Arithmetic operations per configuration, parameters' own left out."""
     nodes = needed(results)
-    fixed = _independent_of_inputs(nodes)
+    fixed = _lane_independent(nodes)
     return sum(n.number not in fixed and n.op not in ("input", "neg") for n in nodes)
 
 
-def _independent_of_inputs(nodes: Sequence[Node]) -> set[int]:
+def _lane_independent(nodes: Sequence[Node], *, own: bool = False) -> set[int]:
+    same = ("constant",) if own else ("constant", "parameter")
     fixed: set[int] = set()
     for node in nodes:
-        if node.op in ("constant", "parameter") or (
-            node.args and all(a.number in fixed for a in node.args)
-        ):
+        if node.op in same or (node.args and all(a.number in fixed for a in node.args)):
             fixed.add(node.number)
     return fixed
 
@@ -68,17 +69,17 @@ def _literal(value: float) -> str:
     return f"({text})" if value < 0 else text
 
 
-def _statement(node: Node, indent: str) -> str:
+def _statement(node: Node, indent: str, lane: str = "") -> str:
     kind = "int" if node.op in ("lt", "le") else "double"
-    return f"{indent}const {kind} v{node.number} = {_expression(node)};"
+    return f"{indent}const {kind} v{node.number} = {_expression(node, lane)};"
 
 
-def _expression(node: Node) -> str:
+def _expression(node: Node, lane: str) -> str:
     args = [_name(a) for a in node.args]
     if node.op == "input":
         return f"x[{int(node.value)} * TILE + i]"
     if node.op == "parameter":
-        return f"p[{int(node.value)}]"
+        return f"p[{int(node.value)} * {lane}]" if lane else f"p[{int(node.value)}]"
     if node.op in _INFIX:
         return f"{args[0]} {_INFIX[node.op]} {args[1]}"
     if node.op == "neg":

@@ -1,13 +1,13 @@
-"""Write the C of all kernels: `python -m kr16cli.kernels.generate FILE`. Build time only.
+"""Write the C of all kernels: `python -m kr16cli.kernels.generate FILE [OWN]`. Build time only.
 
 The model is run once on symbols; the robot's numbers stay parameters, so that one build serves
-every robot of this structure.
+every robot of this structure. OWN gets the kernels of `OWN`, whose lanes have each their own.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +18,23 @@ from kr16cli.kernels.trace import Graph, Node
 from kr16cli.model.orientation import rotation_defect
 from kr16cli.tolerances import TOLERANCES
 
+Variant = tuple[str, Quantity, bool, bool]
 
-def kernels() -> Iterator[tuple[str, Quantity, bool, bool]]:
+OWN = (("forward_dynamics", False), ("forward_dynamics", True), ("jacobian", True), ("fk", True))
+"""What a rollout asks of each robot of its own, and whether drives count; for any gravity."""
+
+
+def own_kernels() -> Iterator[Variant]:
+    """The kernels whose lanes have each their own parameters."""
+    for name, drives in OWN:
+        yield variant(name, vertical=False, drives=drives), QUANTITIES[name], False, drives
+
+
+def kernels() -> Iterator[Variant]:
     """(name, quantity, vertical gravity, drives) of every kernel."""
     for name, quantity in QUANTITIES.items():
         for vertical in (False, True)[: 1 + quantity.gravity]:
-            for drives in (False, True)[: 1 + quantity.drives]:
+            for drives in (False, True) if quantity.drives else (True,):
                 yield variant(name, vertical=vertical, drives=drives), quantity, vertical, drives
 
 
@@ -56,15 +67,15 @@ def _pose_guard(graph: Graph, t: list[Node]) -> Node:
     return bad
 
 
-def source() -> str:
-    """The C text: every kernel, and the table that names them.
+def source(wanted: Iterable[Variant], *, own: bool = False) -> str:
+    """The C text of kernels, and the table that names them; `own` as in `cprint.kernel`.
 
     The including file defines TILE, OMP_SIMD, CLONES, and NAMED(name) for its own names.
     """
     text, table = [f"#define PARAMETER_COUNT {COUNT}", ""], []
-    for name, quantity, vertical, drives in kernels():
+    for name, quantity, vertical, drives in wanted:
         results, guards = traced(quantity, vertical=vertical, drives=drives)
-        text.append(cprint.kernel(f"NAMED({name})", [*results, *guards]))
+        text.append(cprint.kernel(f"NAMED({name})", [*results, *guards], own=own))
         groups = ", ".join(
             f"{{'{'t' if n in ANGLES else 'c'}', {WIDTH.get(n, 6)}}}" for n in quantity.inputs
         )
@@ -77,4 +88,6 @@ def source() -> str:
 
 
 if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(source(), encoding="ascii")
+    Path(sys.argv[1]).write_text(source(kernels()), encoding="ascii")
+    for path in sys.argv[2:]:
+        Path(path).write_text(source(own_kernels(), own=True), encoding="ascii")

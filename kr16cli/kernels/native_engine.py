@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from kr16cli.kernels import _native
 from kr16cli.kernels.parameters import Parameters, pack
 from kr16cli.kernels.quantities import QUANTITIES, variant
 from kr16cli.model.scalars import ZERO
+
+ARM_METHODS = {"fk": 1, "ik": 1, "jacobian": 1, "jacobian_dot": 2}
+"""Methods that a kernel answers as they are, unless a tool is mounted: name -> inputs."""
+
+DYNAMIC_METHODS = {
+    **{"mass_centres": 1, "mass_centre_jacobians": 1, "mass_matrix": 1, "coriolis_matrix": 2},
+    **{"christoffel": 1, "gravity": 1, "bias": 2, "inverse_dynamics": 3, "forward_dynamics": 3},
+    "base_wrench": 3,
+}
+"""The same of those that need inertial data."""
 
 
 class NativeKernels(dict[str, Any]):
@@ -27,3 +38,7 @@ class NativeKernels(dict[str, Any]):
         kernel = variant(name, vertical=self._vertical, drives=self._drives)
         self[name] = _native.Kernel(kernel, self._numbers, QUANTITIES[name].shape)
         return self[name]
+
+    def method(self, name: str, required: int, fallback: Callable[..., Any]) -> Any:
+        """A callable like the method `fallback`, whose plain cases skip Python."""
+        return _native.Method(self[name], required, fallback)

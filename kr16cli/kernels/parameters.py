@@ -47,22 +47,27 @@ def parameters(arm: Arm) -> Parameters:
         arm.base_bodies if dynamic else (),
         arm.rotors,
         arm.bodies if dynamic else (),
-        [j.coulomb or 0.0 for j in joints],
-        [j.viscous or 0.0 for j in joints],
+        [0.0 if j.coulomb is None else j.coulomb for j in joints],
+        [0.0 if j.viscous is None else j.viscous for j in joints],
     )
 
 
 def pack(k: Parameters) -> list[float]:
     """The flat vector; inertial numbers are NaN where the robot has none."""
+    return [float(v) for v in flatten(k)]
+
+
+def flatten(k: Parameters) -> list[Scalar]:
+    """The flat vector in scalars of any kind."""
     values: list[Scalar] = [*k.geometry, *k.gravity]
     for i in range(6):
         values += _fields(k.base, i, _BASE if i else _BASE_FIRST)
-    values += k.rotors
+    values += [*k.rotors]
     for i in range(6):
         values += _fields(k.full, i, _FULL)
     values += k.coulomb or [0.0] * 6
     values += k.viscous or [0.0] * 6
-    return [float(v) for v in values]
+    return values
 
 
 def unpack(values: Sequence[Scalar], *, vertical: bool, drives: bool) -> Parameters:

@@ -11,7 +11,17 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from kr16cli.kernels.parameters import Parameters
-from kr16cli.model import chain, coriolis, dynamics, energy, forward, inverse, jacobian
+from kr16cli.model import (
+    branches,
+    chain,
+    coriolis,
+    derivatives,
+    dynamics,
+    energy,
+    forward,
+    inverse,
+    jacobian,
+)
 from kr16cli.model.scalars import Functions, Scalar
 
 Flat = Iterable[Scalar]
@@ -19,15 +29,15 @@ Flat = Iterable[Scalar]
 ANGLES = frozenset({"q", "near"})
 """Inputs that enter as pairs (cos, sin)."""
 
-WIDTH = {"T": 16}
+WIDTH = {"T": 16, "limits": 12}
 """Numbers of an input where they are not six."""
 
 
 class Quantity(NamedTuple):
     """One quantity: its inputs, the shape of its result, its function.
 
-    `gravity`, `drives`: whether it depends on them, so that kernels for vertical gravity and
-    for the rigid arm save operations.
+    `gravity`, `drives`: whether kernels of their own for vertical gravity and for the rigid arm
+    save enough operations; else one serves for any gravity, and counts friction if it matters.
     """
 
     inputs: tuple[str, ...]
@@ -58,6 +68,11 @@ def _ik(k: Parameters, t: Any, near: Any, ns: Functions) -> Flat:
     rotation = [t[0:3], t[4:7], t[8:11]]
     p = (t[3], t[7], t[11])
     return flat(inverse.solve_near(rotation, p, k.geometry, near, ns).angles)
+
+
+def _branches(k: Parameters, t: Any, limits: Any, ns: Functions) -> Flat:
+    rotation = [t[0:3], t[4:7], t[8:11]]
+    return branches.judge(rotation, (t[3], t[7], t[11]), k.geometry, limits[:6], limits[6:], ns)
 
 
 def _jacobian(k: Parameters, cs: Any, _: Functions) -> Flat:
@@ -114,6 +129,13 @@ def _friction(k: Parameters, qd: Any, ns: Functions) -> list[Scalar]:
     return dynamics.friction(qd, k.coulomb, k.viscous, ns)
 
 
+def _bias(k: Parameters, cs: Any, qd: Any, ns: Functions) -> Flat:
+    torque = dynamics.bias(cs, qd, k.base, k.geometry, k.gravity)
+    if not k.coulomb:
+        return torque
+    return [t + f for t, f in zip(torque, _friction(k, qd, ns), strict=True)]
+
+
 def _inverse_dynamics(k: Parameters, cs: Any, qd: Any, qdd: Any, ns: Functions) -> Flat:
     tau = dynamics.inverse_dynamics(cs, qd, qdd, k.base, k.geometry, k.gravity, k.rotors)
     if not k.coulomb:
@@ -125,6 +147,27 @@ def _forward_dynamics(k: Parameters, cs: Any, qd: Any, tau: Any, ns: Functions) 
     if k.coulomb:
         tau = [t - f for t, f in zip(tau, _friction(k, qd, ns), strict=True)]
     return dynamics.forward_dynamics(cs, qd, tau, k.base, k.geometry, k.gravity, k.rotors)
+
+
+def _inverse_dynamics_derivatives(k: Parameters, cs: Any, qd: Any, qdd: Any, ns: Functions) -> Flat:
+    by_q, by_qd, by_qdd = derivatives.inverse_dynamics_derivatives(
+        cs, qd, qdd, k.base, k.geometry, k.gravity, k.rotors
+    )
+    if k.coulomb:
+        for i, slope in enumerate(dynamics.friction_slope(qd, k.coulomb, k.viscous, ns)):
+            by_qd[i][i] = by_qd[i][i] + slope
+    return flat((*by_q, *by_qd, *by_qdd))
+
+
+def _forward_dynamics_derivatives(k: Parameters, cs: Any, qd: Any, tau: Any, ns: Functions) -> Flat:
+    slopes = dynamics.AT_REST
+    if k.coulomb:
+        tau = [t - f for t, f in zip(tau, _friction(k, qd, ns), strict=True)]
+        slopes = tuple(dynamics.friction_slope(qd, k.coulomb, k.viscous, ns))
+    by_q, by_qd, by_tau = derivatives.forward_dynamics_derivatives(
+        cs, qd, tau, k.base, k.geometry, k.gravity, k.rotors, slopes
+    )
+    return flat((*by_q, *by_qd, *by_tau))
 
 
 def _energy(k: Parameters, cs: Any, qd: Any, _: Functions) -> Flat:
@@ -142,6 +185,7 @@ QUANTITIES: dict[str, Quantity] = {
     "fk": Quantity(("q",), (4, 4), _fk),
     "frames": Quantity(("q",), (140,), _frames),
     "ik": Quantity(("T", "near"), (8, 6), _ik),
+    "branches": Quantity(("T", "limits"), (6,), _branches),
     "jacobian": Quantity(("q",), (6, 6), _jacobian),
     "jacobian_dot": Quantity(("q", "qd"), (6, 6), _jacobian_dot),
     "singularity": Quantity(("q",), (4,), _singularity),
@@ -154,11 +198,19 @@ QUANTITIES: dict[str, Quantity] = {
     "equation": Quantity(("q", "qd"), (78,), _equation, gravity=True),
     "energy": Quantity(("q", "qd"), (2,), _energy, gravity=True),
     "base_wrench": Quantity(("q", "qd", "qdd"), (6,), _base_wrench, gravity=True),
+    "bias": Quantity(("q", "qd"), (6,), _bias, gravity=True, drives=True),
     "inverse_dynamics": Quantity(
         ("q", "qd", "qdd"), (6,), _inverse_dynamics, gravity=True, drives=True
     ),
     "forward_dynamics": Quantity(
         ("q", "qd", "tau"), (6,), _forward_dynamics, gravity=True, drives=True
+    ),
+    # Kernels of their own for vertical gravity and the rigid arm would save these 3 and 6 %.
+    "inverse_dynamics_derivatives": Quantity(
+        ("q", "qd", "qdd"), (3, 6, 6), _inverse_dynamics_derivatives
+    ),
+    "forward_dynamics_derivatives": Quantity(
+        ("q", "qd", "tau"), (3, 6, 6), _forward_dynamics_derivatives
     ),
 }
 

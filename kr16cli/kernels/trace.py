@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from kr16cli.model.scalars import Functions, Scalar, _Zero
+from kr16cli.model.scalars import ZERO, Functions, Scalar, _Zero
 
 COMMUTATIVE = frozenset({"add", "mul"})
 
@@ -105,7 +105,7 @@ class Graph:
         return a.args[0] if a.op == "neg" else self.node("neg", a)
 
     def binary(self, op: str, left: Scalar, right: Scalar) -> Scalar:
-        """A binary operation, folded where that is exact for every value, NaN included."""
+        """A binary operation, folded where that is exact for every value or a term cancels."""
         if isinstance(left, _Zero) or isinstance(right, _Zero):
             return NotImplemented
         a, b = self.lift(left), self.lift(right)
@@ -117,7 +117,28 @@ class Graph:
             op, a, b = "sub", b, a.args[0]
         elif op in ("add", "sub") and b.op == "neg":
             op, b = ("sub" if op == "add" else "add"), b.args[0]
+        if op == "sub":
+            return self._difference(a, b)
+        if op == "add":
+            for taken, other in ((a, b), (b, a)):
+                if taken.op == "sub" and taken.args[1] is other:
+                    return taken.args[0]
         return self.node(op, a, b)
+
+    def _difference(self, a: Node, b: Node) -> Scalar:
+        """a - b; what was added and is taken away again cancels: kernels get finite numbers."""
+        if a is b:
+            return ZERO
+        if a.op == "neg":
+            return -self.binary("add", a.args[0], b)
+        if a.op == "add" and b in a.args:
+            return a.args[1 - a.args.index(b)]
+        if b.op == "sub" and b.args[0] is a:
+            return b.args[1]
+        turned = (b.op == "add" and a in b.args) or (a.op == "sub" and a.args[0] is b)
+        if turned or ("sub", (b.number, a.number), 1.0, 0.0) in self._known:
+            return -self._difference(b, a)
+        return self.node("sub", a, b)
 
     def _product(self, op: str, a: Node, b: Node) -> Node:
         if b.op == "constant" and abs(b.value) == 1.0:

@@ -15,12 +15,12 @@ C + C^T = M_dot and C qd = bias - G hold identically (checked in `verify` and th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from kr16cli.model.dynamics import joint_steps, rotated, shifted, wrench_out
+from kr16cli.model.dynamics import Wrench, joint_steps, rotated, shifted, wrench_out
 from kr16cli.model.inertia import NOWHERE, Body, Step, turn_in, turn_out
-from kr16cli.model.scalars import ZERO, Scalar, Trig, Vector, add, cross
+from kr16cli.model.scalars import ZERO, Scalar, Trig, Vector, add, cross, dot
 from kr16cli.robot import Geometry
 
 Matrix3 = tuple[Vector, Vector, Vector]
@@ -87,6 +87,61 @@ def flow_out(
     return Flow(p, _outer_sum(n, p, d, d_rate, h))
 
 
+def composites(
+    trail: Sequence[tuple[Step, Scalar, Scalar]], omegas: Sequence[Vector], bodies: Sequence[Body]
+) -> Iterator[tuple[int, Body, Flow]]:
+    """(i, body, its motion) of links i to 5 as one, i from 5 to 0, in joint frame i."""
+    total, flow = bodies[5], body_flow(bodies[5], omegas[5])
+    yield 5, total, flow
+    for i in range(4, -1, -1):
+        step, c, s = trail[i + 1]
+        d_rate = cross(omegas[i], step.shift)
+        turned = rotated(total, step.alpha, c, s)
+        flow = flow_out(flow, turned.h, step.shift, d_rate, total.m, (step.alpha, c, s))
+        flow = flow + body_flow(bodies[i], omegas[i])
+        total = shifted(turned, step.shift) + bodies[i]
+        yield i, total, flow
+
+
+class Reach(NamedTuple):
+    """Moments of a body under the unit motion xi = z_i x (r - o_i) about a frame's origin o.
+
+    `force` sum m xi, `moment` sum m (r - o) x xi, `rate` sum m (r - o)' x xi: f1, n1, n2.
+    """
+
+    force: Vector
+    moment: Vector
+    rate: Vector
+
+
+def unit_reach(total: Body, flow: Flow) -> Reach:
+    """The moments in the axis' own frame."""
+    (nxx, _, _), (_, nyy, _), (nzx, nzy, _) = flow.n
+    force = (-total.h[1], total.h[0], ZERO)
+    return Reach(force, (total.xz, total.yz, total.zz), (-nzx, -nzy, nxx + nyy))
+
+
+def reach_out(reach: Reach, omega: Vector, turn: tuple[Step, Scalar, Scalar]) -> Reach:
+    """The moments in the parent's axes, about its origin; the parent turns with `omega`."""
+    step, c, s = turn
+    force, moment = wrench_out(reach.force, reach.moment, step, c, s)
+    rate = turn_out(reach.rate, step.alpha, c, s)
+    return Reach(force, moment, add(rate, cross(cross(omega, step.shift), force)))
+
+
+def axis_rate(omega: Vector) -> Vector:
+    """z' of the frame's z axis."""
+    return omega[1], -omega[0], ZERO
+
+
+def column(total: Body, flow: Flow, omega: Vector) -> Wrench:
+    """Force and moment of a column of C, from the composite beyond its axis."""
+    (nxx, _, nxz), (_, nyy, nyz), _ = flow.n
+    z_rate = axis_rate(omega)
+    force = add(cross(z_rate, total.h), (-flow.p[1], flow.p[0], ZERO))
+    return force, add(total.times(z_rate), (-nxz, -nyz, nxx + nyy))
+
+
 def coriolis_matrix(
     cs: Trig, qd: Sequence[Scalar], bodies: Sequence[Body], g: Geometry
 ) -> list[list[Scalar]]:
@@ -100,46 +155,16 @@ def coriolis_matrix(
         omegas.append(omega)
 
     matrix: list[list[Scalar]] = [[ZERO] * 6 for _ in range(6)]
-    total, flow = bodies[5], body_flow(bodies[5], omegas[5])
-    for i in range(5, -1, -1):
-        _fill(matrix, i, total, flow, omegas, trail)
-        if i:
-            step, c, s = trail[i]
-            d_rate = cross(omegas[i - 1], step.shift)
-            turned = rotated(total, step.alpha, c, s)
-            flow = flow_out(flow, turned.h, step.shift, d_rate, total.m, (step.alpha, c, s))
-            flow = flow + body_flow(bodies[i - 1], omegas[i - 1])
-            total = shifted(turned, step.shift) + bodies[i - 1]
+    for i, total, flow in composites(trail, omegas, bodies):
+        force, moment = column(total, flow, omegas[i])
+        reach = unit_reach(total, flow)
+        matrix[i][i] = moment[2]
+        for j in range(i - 1, -1, -1):
+            force, moment = wrench_out(force, moment, *trail[j + 1])
+            matrix[j][i] = moment[2]
+            reach = reach_out(reach, omegas[j], trail[j + 1])
+            matrix[i][j] = dot(axis_rate(omegas[j]), reach.moment) + reach.rate[2]
     return matrix
-
-
-def _fill(
-    matrix: list[list[Scalar]],
-    i: int,
-    total: Body,
-    flow: Flow,
-    omegas: Sequence[Vector],
-    trail: Sequence[tuple[Step, Scalar, Scalar]],
-) -> None:
-    """Column i above and row i left of the diagonal, from the composite of links i and after."""
-    wx, wy, _ = omegas[i]
-    (nxx, _, nxz), (_, nyy, nyz), (nzx, nzy, _) = flow.n
-    axis_rate = (wy, -wx, ZERO)
-    spin = nxx + nyy
-    force = add(cross(axis_rate, total.h), (-flow.p[1], flow.p[0], ZERO))
-    moment = add(total.times(axis_rate), (-nxz, -nyz, spin))
-    f1: Vector = (-total.h[1], total.h[0], ZERO)
-    n1: Vector = (total.xz, total.yz, total.zz)
-    n2: Vector = (-nzx, -nzy, spin)
-    matrix[i][i] = moment[2]
-    for j in range(i - 1, -1, -1):
-        step, c, s = trail[j + 1]
-        force, moment = wrench_out(force, moment, step, c, s)
-        matrix[j][i] = moment[2]
-        n2 = turn_out(n2, step.alpha, c, s)
-        f1, n1 = wrench_out(f1, n1, step, c, s)
-        n2 = add(n2, cross(cross(omegas[j], step.shift), f1))
-        matrix[i][j] = omegas[j][1] * n1[0] - omegas[j][0] * n1[1] + n2[2]
 
 
 def christoffel(cs: Trig, bodies: Sequence[Body], g: Geometry) -> list[list[list[Scalar]]]:

@@ -8,7 +8,8 @@ cost nothing. Rotor inertia is six diagonal numbers, reflected to the link side.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 from kr16cli.model.inertia import NOWHERE, Body, Step, steps, turn_in, turn_out
 from kr16cli.model.scalars import (
@@ -91,6 +92,53 @@ def _second_moments(b: Body) -> Vector:
     return half - b.xx, half - b.yy, half - b.zz
 
 
+class Motion(NamedTuple):
+    """How a link moves, in its joint frame: omega, U (`motion_matrix`), the origin's acceleration.
+
+    rad/s, 1/s2, m/s2; the acceleration counts gravity as one of the base upward.
+    """
+
+    omega: Vector
+    u: Matrix3
+    acceleration: Vector
+
+
+def motions(
+    trail: Sequence[tuple[Step, Scalar, Scalar]],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+    base: Vector,
+) -> Iterator[Motion]:
+    """The motion of each link, from the base outward along `joint_steps`."""
+    omega, omega_dot, acceleration = NOWHERE, NOWHERE, base
+    u: Matrix3 = (NOWHERE, NOWHERE, NOWHERE)
+    for (step, c, s), rate, rate_dot in zip(trail, qd, qdd, strict=True):
+        acceleration = turn_in(add(acceleration, _times(u, step.shift)), step.alpha, c, s)
+        omega, omega_dot = (turn_in(v, step.alpha, c, s) for v in (omega, omega_dot))
+        omega_dot = (
+            omega_dot[0] + omega[1] * rate,
+            omega_dot[1] - omega[0] * rate,
+            omega_dot[2] + rate_dot,
+        )
+        omega = (omega[0], omega[1], omega[2] + rate)
+        u = motion_matrix(omega, omega_dot)
+        yield Motion(omega, u, acceleration)
+
+
+def joint_wrenches(
+    trail: Sequence[tuple[Step, Scalar, Scalar]], moving: Iterable[Motion], bodies: Sequence[Body]
+) -> list[Wrench]:
+    """What each joint passes on to the links beyond it, in its joint frame."""
+    own = [body_wrench(b, m.u, m.acceleration) for m, b in zip(moving, bodies, strict=True)]
+    force, moment = own[5]
+    result = [(force, moment)]
+    for i in range(4, -1, -1):
+        force, moment = wrench_out(force, moment, *trail[i + 1])
+        force, moment = add(force, own[i][0]), add(moment, own[i][1])
+        result.insert(0, (force, moment))
+    return result
+
+
 def newton_euler(
     cs: Trig,
     qd: Sequence[Scalar],
@@ -104,29 +152,8 @@ def newton_euler(
     `base` is the acceleration of the base (`base_acceleration`).
     """
     trail = joint_steps(g, cs)
-    omega, omega_dot, acceleration = NOWHERE, NOWHERE, base
-    u: Matrix3 = (NOWHERE, NOWHERE, NOWHERE)
-    wrenches: list[Wrench] = []
-    for (step, c, s), rate, rate_dot, body in zip(trail, qd, qdd, bodies, strict=True):
-        acceleration = turn_in(add(acceleration, _times(u, step.shift)), step.alpha, c, s)
-        omega, omega_dot = (turn_in(v, step.alpha, c, s) for v in (omega, omega_dot))
-        omega_dot = (
-            omega_dot[0] + omega[1] * rate,
-            omega_dot[1] - omega[0] * rate,
-            omega_dot[2] + rate_dot,
-        )
-        omega = (omega[0], omega[1], omega[2] + rate)
-        u = motion_matrix(omega, omega_dot)
-        wrenches.append(body_wrench(body, u, acceleration))
-
-    torque: list[Scalar] = [ZERO] * 6
-    force, moment = NOWHERE, NOWHERE
-    for i in range(5, -1, -1):
-        force, moment = add(force, wrenches[i][0]), add(moment, wrenches[i][1])
-        torque[i] = moment[2]
-        if i:
-            force, moment = wrench_out(force, moment, *trail[i])
-    return torque, (force, moment)
+    wrenches = joint_wrenches(trail, motions(trail, qd, qdd, base), bodies)
+    return [moment[2] for _, moment in wrenches], wrenches[0]
 
 
 def wrench_out(force: Vector, moment: Vector, step: Step, c: Scalar, s: Scalar) -> Wrench:
@@ -219,9 +246,16 @@ def mass_matrix(
     return matrix
 
 
-def solve_symmetric(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]) -> list[Scalar]:
-    """x of A x = b for symmetric positive definite A, by L D L^T: no square root, no branch."""
-    n = len(right)
+class Factors(NamedTuple):
+    """A = L D L^T of a symmetric positive definite matrix: L below its diagonal of ones, 1/D."""
+
+    lower: Sequence[Sequence[Scalar]]
+    inverse_d: Sequence[Scalar]
+
+
+def factored(matrix: Sequence[Sequence[Scalar]]) -> Factors:
+    """L D L^T of a symmetric positive definite matrix: no square root, no branch."""
+    n = len(matrix)
     lower = [[ZERO] * n for _ in range(n)]
     inverse_d: list[Scalar] = []
     for i in range(n):
@@ -232,13 +266,24 @@ def solve_symmetric(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar])
             lower[i][j] = v * inverse_d[j]
         pivot = matrix[i][i] - sum_of(scaled[k] * lower[i][k] for k in range(i))
         inverse_d.append(1 / pivot)
+    return Factors(lower, inverse_d)
+
+
+def solved(a: Factors, right: Sequence[Scalar]) -> list[Scalar]:
+    """x of A x = b."""
+    n = len(right)
     x: list[Scalar] = []
     for i in range(n):
-        x.append(right[i] - sum_of(lower[i][k] * x[k] for k in range(i)))
-    x = [v * d for v, d in zip(x, inverse_d, strict=True)]
+        x.append(right[i] - sum_of(a.lower[i][k] * x[k] for k in range(i)))
+    x = [v * d for v, d in zip(x, a.inverse_d, strict=True)]
     for i in range(n - 1, -1, -1):
-        x[i] = x[i] - sum_of(lower[k][i] * x[k] for k in range(i + 1, n))
+        x[i] = x[i] - sum_of(a.lower[k][i] * x[k] for k in range(i + 1, n))
     return x
+
+
+def solve_symmetric(matrix: Sequence[Sequence[Scalar]], right: Sequence[Scalar]) -> list[Scalar]:
+    """x of A x = b for symmetric positive definite A."""
+    return solved(factored(matrix), right)
 
 
 def forward_dynamics(
@@ -267,3 +312,15 @@ def friction(
         kv * rate + kc * (rate / ns.sqrt(rate * rate + v2))
         for rate, kc, kv in zip(qd, coulomb, viscous, strict=True)
     ]
+
+
+def friction_slope(
+    qd: Sequence[Scalar], coulomb: Sequence[Scalar], viscous: Sequence[Scalar], ns: Functions
+) -> list[Scalar]:
+    """d friction / d qd, N m s: viscous + coulomb v^2 / sqrt(qd^2 + v^2)^3."""
+    v2 = TOLERANCES.coulomb_speed**2
+    slopes = []
+    for rate, kc, kv in zip(qd, coulomb, viscous, strict=True):
+        square = rate * rate + v2
+        slopes.append(kv + kc * (v2 / (square * ns.sqrt(square))))
+    return slopes

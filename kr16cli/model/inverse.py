@@ -30,7 +30,8 @@ class Solutions(NamedTuple):
     `angles[b]` are six angles in (-pi, pi], NaN (floats) where branch b is out of reach.
     `reach[shoulder]` is (squared distance from A2 axis to wrist centre (m2), elbow cosine);
     beyond +-1 no elbow closes. `on_axis`, `straight_wrist[arm]` and `folded[shoulder]` are the
-    singular cases.
+    singular cases; `wrist_sine[arm]` is |sin q5|, `beyond[shoulder]` whether no elbow closes and
+    `turn[shoulder]` A1 all the same.
     """
 
     angles: list[list[Scalar]]
@@ -38,6 +39,9 @@ class Solutions(NamedTuple):
     on_axis: Scalar
     straight_wrist: list[Scalar]
     folded: list[Scalar]
+    wrist_sine: list[Scalar]
+    beyond: list[Scalar]
+    turn: list[Scalar]
 
 
 def principal(angle: Scalar, ns: Functions) -> Scalar:
@@ -106,7 +110,7 @@ def _elbows(u: Scalar, w: Scalar, g: Geometry, near: _Near, slack: Scalar, ns: F
     q3_over = ns.where(q3_over > ns.pi, q3_over - 2 * ns.pi, q3_over)
 
     folded = square < TOLERANCES.fold * TOLERANCES.fold
-    norm = ns.where(folded, 1, square)
+    over = 1 / ns.where(folded, 1, square)
     along, across = g.a2 + forearm * c, forearm * s
     au, aw, bu, bw = along * u, along * w, across * u, across * w
     c3_even, c3_odd = c * cos_tilt, s * sin_tilt
@@ -118,7 +122,7 @@ def _elbows(u: Scalar, w: Scalar, g: Geometry, near: _Near, slack: Scalar, ns: F
     ):
         c2_free, s2_free = (ns.where(folded, n, v) for n, v in zip(near.q2, (c2, s2), strict=True))
         pairs.append((principal(ns.atan2(s2_free, c2_free), ns), q3))
-        forearms.append(angle_sum((c2_free / norm, s2_free / norm), trig3))
+        forearms.append(angle_sum((c2_free * over, s2_free * over), trig3))
     return _Elbow(pairs, forearms, (square, cosine), beyond, folded)
 
 
@@ -140,10 +144,10 @@ def solve_near(
     x, y, z = wrist_centre(rotation, p, g)
     radius = ns.sqrt(x * x + y * y)
     on_axis = radius < TOLERANCES.shoulder
-    norm = ns.where(on_axis, 1, radius)
+    over = 1 / ns.where(on_axis, 1, radius)
     c1_r, s1_r = ns.where(on_axis, free.q1[0], x), ns.where(on_axis, free.q1[1], -y)
     q1 = principal(ns.atan2(s1_r, c1_r), ns)
-    c1, s1 = c1_r / norm, s1_r / norm
+    c1, s1 = c1_r * over, s1_r * over
     radius = ns.where(on_axis, 0, radius)
 
     front = _Plane(
@@ -157,23 +161,27 @@ def solve_near(
     behind = turned_back(q1, ns.where(on_axis, 0, ns.pi), ns)
 
     angles: list[list[Scalar]] = []
-    reach, straight, folds = [], [], []
+    reach, straight, folds, sines, beyond = [], [], [], [], []
     for first, forward, plane in ((q1, radius, front), (behind, -radius, back)):
         elbows = _elbows(forward - g.a1, z - g.d1, g, free, slack, ns)
         reach.append(elbows.reach)
         folds.append(elbows.folded)
+        beyond.append(elbows.beyond)
         q1_or_nan = ns.where(elbows.beyond, math.nan, first)
         for (q2, q3), forearm in zip(elbows.pairs, elbows.forearm, strict=True):
-            wrists, singular = _wrists(plane, forearm, free, ns)
+            wrists, singular, sine = _wrists(plane, forearm, free, ns)
             straight.append(singular)
+            sines.append(sine)
             angles.extend([q1_or_nan, q2, q3, *wrist] for wrist in wrists)
-    return Solutions(angles, reach, on_axis, straight, folds)
+    return Solutions(angles, reach, on_axis, straight, folds, sines, beyond, [q1, behind])
 
 
 def _wrists(
     plane: _Plane, forearm: tuple[Scalar, Scalar], near: _Near, ns: Functions
-) -> tuple[list[list[Scalar]], Scalar]:
+) -> tuple[list[list[Scalar]], Scalar, Scalar]:
     """The two wrists (q4, q5, q6) of one arm posture, (3.21)-(3.26) in the form given above.
+
+    Also whether the wrist is straight, and |sin q5|.
 
     R36's first row is -n, its second the lateral row, its third minus the row along the forearm.
     """
@@ -183,11 +191,11 @@ def _wrists(
     c5 = c23 * plane.forward[2] - s23 * plane.up[2]
     s5 = ns.sqrt(nz * nz + lz * lz)
     singular = s5 < TOLERANCES.wrist
-    norm = ns.where(singular, 1, s5)
+    over = 1 / ns.where(singular, 1, s5)
     c4_r, s4_r = ns.where(singular, near.q4[0], -nz), ns.where(singular, near.q4[1], lz)
     q4 = principal(ns.atan2(s4_r, c4_r), ns)
     q5 = ns.atan2(ns.where(singular, 0, s5), c5)
-    c4, s4 = c4_r / norm, s4_r / norm
+    c4, s4 = c4_r * over, s4_r * over
     q6 = principal(ns.atan2(c4 * lx + s4 * nx, -(c4 * ly + s4 * ny)), ns)
     half_turn = ns.where(singular, 0, ns.pi)
     flipped = [
@@ -195,4 +203,4 @@ def _wrists(
         principal(-q5, ns),
         turned_back(q6, half_turn, ns),
     ]
-    return [[q4, q5, q6], flipped], singular
+    return [[q4, q5, q6], flipped], singular, s5

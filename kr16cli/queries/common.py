@@ -5,14 +5,20 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from kr16cli import kuka, units
 from kr16cli.errors import InputError, Kr16Error
 from kr16cli.krl import parse_krl
 from kr16cli.model.task import product
 from kr16cli.robot import RobotData
+from kr16cli.single import Arm
 from kr16cli.tolerances import TOLERANCES
+
+if TYPE_CHECKING:
+    from kr16cli.api import Robot
+    from kr16cli.queries.many import Many
 
 Matrix = list[list[float]]
 
@@ -68,6 +74,7 @@ class Question(ABC):
     units: dict[str, str]
     column_units: dict[str, str]
     options: dict[str, Any]
+    arm: Arm
 
     def __init__(self, data: RobotData, *, si: bool) -> None:
         self.data, self.si = data, si
@@ -93,6 +100,29 @@ class Question(ABC):
                 "(1.8e308); give smaller ones"
             )
         return answer
+
+    # Many rows ------------------------------------------------------------------------------
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The arm on arrays."""
+        from kr16cli.api import Robot
+
+        return Robot(self.arm.data, payload=self.arm.payload, drives=self.arm.drives)
+
+    def quicken(self) -> None:
+        """Prepare for thousands of answers one by one: the arm's functions are written out."""
+        from kr16cli.kernels.straight import straight_arm
+
+        self.arm = straight_arm(self.arm.data, payload=self.arm.payload, drives=self.arm.drives)
+
+    def takes_many(self, kind: str) -> bool:
+        """Whether `many` gives all that an output of a kind (csv, npz) holds."""
+        return kind in ("csv", "npz")
+
+    @abstractmethod
+    def many(self, values: Mapping[str, Any]) -> Many:
+        """Answers to typed numbers by group: arrays (n, 6), or (n, 4, 4) as `T`."""
 
     @property
     def beyond_columns(self) -> dict[str, str]:

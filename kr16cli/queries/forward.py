@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kr16cli import kuka
 from kr16cli.errors import InputError
@@ -12,6 +12,9 @@ from kr16cli.model.scalars import FLOATS
 from kr16cli.queries.common import Answer, Question, chained, inverse_pose, plain
 from kr16cli.robot import RobotData
 from kr16cli.single import Arm, Base
+
+if TYPE_CHECKING:
+    from kr16cli.queries.many import Many
 
 _POSE = ("x", "y", "z", "a", "b", "c", "s", "t")
 FRAMES = ("all", "robroot", "chapter")
@@ -81,6 +84,10 @@ class ForwardQuestion(Question):
             axes: Base = "chapter" if self.frames == "chapter" else "robroot"
             points = self.arm.mass_centres(q, axes)
             result["mass_centres"] = [self.lengths(p) for p in points]
+        return Answer(result, self.warnings(q))
+
+    def warnings(self, q: Sequence[float]) -> list[str]:
+        """Joints outside their limits, and where Turn may be ignored."""
         warnings = self.limit_warnings(q)
         switch = [f"A{i + 1}" for i in kuka.near_turn_switch(q)]
         if switch:
@@ -88,7 +95,17 @@ class ForwardQuestion(Question):
                 f"{', '.join(switch)} within 2 deg of 0: a controller may ignore this Turn bit "
                 "(unconfirmed)"
             )
-        return Answer(result, warnings)
+        return warnings
+
+    def takes_many(self, kind: str) -> bool:
+        """Frames are asked row by row."""
+        return super().takes_many(kind) and (self.frames is None or kind == "csv")
+
+    def many(self, values: Mapping[str, Any]) -> Many:
+        """Poses for `values["q"]` (n, 6)."""
+        from kr16cli.queries.many import forward_kinematics
+
+        return forward_kinematics(self, values)
 
     def _frames(self, q: list[float], cs: Sequence[tuple[float, float]]) -> dict[str, Any]:
         axes: Base = "chapter" if self.frames == "chapter" else "robroot"

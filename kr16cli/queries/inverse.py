@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kr16cli import kuka, units
 from kr16cli.errors import InputError
@@ -14,6 +14,9 @@ from kr16cli.queries.common import Answer, Matrix, Question, chained, inverse_po
 from kr16cli.robot import RobotData
 from kr16cli.single import Arm
 from kr16cli.tolerances import TOLERANCES
+
+if TYPE_CHECKING:
+    from kr16cli.queries.many import Many
 
 _JOINTS = ("a1", "a2", "a3", "a4", "a5", "a6")
 # Rows that differ by less (rad) are one solution: a merged elbow pair differs by at most twice
@@ -118,6 +121,16 @@ class InverseQuestion(Question):
             "singularity": self._singularity(found, [index for index, _ in kept]),
         }
         return self._judged(result, bool(kept))
+
+    def takes_many(self, kind: str) -> bool:
+        """A choice of Turn and the variants of --turns are asked row by row."""
+        return super().takes_many(kind) and self.turn is None and not self.turns
+
+    def many(self, values: Mapping[str, Any]) -> Many:
+        """The best solutions for `values["pose"]` (n, 6) or `values["T"]` (n, 4, 4)."""
+        from kr16cli.queries.many_inverse import inverse_kinematics
+
+        return inverse_kinematics(self, values, _SAME)
 
     def _judged(self, result: dict[str, Any], reached: bool) -> Answer:
         """The answer with its status, problem, warnings and the solution to follow."""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kr16cli.errors import InputError, NoAnswerError
 from kr16cli.queries.common import Answer, Question, flat, plain
 from kr16cli.robot import Payload, RobotData, Vector3
 from kr16cli.single import Arm
+
+if TYPE_CHECKING:
+    from kr16cli.queries.many import Many
 
 _ZEROS = (0.0,) * 6
 _UNITS = {
@@ -107,7 +110,7 @@ class DynamicsQuestion(Question):
         result["base_wrench_of"] = moving
         if self.christoffel:
             result["christoffel"] = plain(arm.christoffel(q))
-        warnings = self.limit_warnings(q) + self._load_warnings(result)
+        warnings = self.warnings(q, result)
         if self.task:
             try:
                 result["task"] = {k: plain(v) for k, v in arm.task_space(q, qd)._asdict().items()}
@@ -116,7 +119,21 @@ class DynamicsQuestion(Question):
                 warnings.append(str(error))
         return Answer(result, warnings)
 
-    def _load_warnings(self, result: Mapping[str, Any]) -> list[str]:
+    def warnings(self, q: Sequence[float], result: Mapping[str, Any]) -> list[str]:
+        """Joints outside their limits, and what exceeds the robot's ratings."""
+        return self.limit_warnings(q) + self.load_warnings(result)
+
+    def takes_many(self, kind: str) -> bool:
+        """Dynamics in task space are asked row by row."""
+        return super().takes_many(kind) and not self.task
+
+    def many(self, values: Mapping[str, Any]) -> Many:
+        """Dynamics for `values["q"]`, and `values` of qd, qdd and tau, (n, 6) each."""
+        from kr16cli.queries.many_rates import dynamics
+
+        return dynamics(self, values)
+
+    def load_warnings(self, result: Mapping[str, Any]) -> list[str]:
         """What exceeds the robot's ratings: payload and torque."""
         texts = []
         rated = self.data.ratings.get("payload_kg")

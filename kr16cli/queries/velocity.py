@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from kr16cli import linear, units
 from kr16cli.errors import InputError
@@ -14,6 +14,9 @@ from kr16cli.queries.common import Answer, Question, flat, plain
 from kr16cli.robot import RobotData
 from kr16cli.single import Arm
 from kr16cli.tolerances import TOLERANCES
+
+if TYPE_CHECKING:
+    from kr16cli.queries.many import Many
 
 ROWS = ("vx", "vy", "vz", "wx", "wy", "wz")
 AXES = ("robroot", "flange", "chapter")
@@ -103,7 +106,7 @@ class JacobianQuestion(Question):
         shown = ", ".join(f"{v:g}" for v in self.point)
         return f"({shown}) {self.length_unit} in {frame}"
 
-    def _local(self, q: Sequence[float]) -> list[float] | None:
+    def local(self, q: Sequence[float]) -> list[float] | None:
         """The point in the link's frame, m; None is its origin."""
         if self.point is None or self.point == "flange":
             return None
@@ -122,7 +125,7 @@ class JacobianQuestion(Question):
     def answer(self, values: Mapping[str, Any]) -> Answer:
         """The Jacobian for `values["q"]`, and its rate for `values["qd"]` or the option's qd."""
         q = self.radians(values["q"])
-        point = self._local(q)
+        point = self.local(q)
         J = plain(self.arm.jacobian(q, link=self.link, point=point, axes=self.axes))
         sigma = linear.singular_values(J)
         determinant = self.arm.determinant(q) if self.link == 6 else 0.0
@@ -154,13 +157,21 @@ class JacobianQuestion(Question):
                 q, self.radians(qd), link=self.link, point=point, axes=self.axes
             )
             result["jacobian_dot"] = plain(rate)
-        warnings = self.limit_warnings(q)
-        warnings += [
-            f"near the {one['kind']} singularity: {one['meaning']} is {one['factor']:.3g}"
-            for one in result["singularities"]
-            if one["near"]
+        return Answer(result, self.warnings(q))
+
+    def warnings(self, q: Sequence[float]) -> list[str]:
+        """Joints outside their limits, and singularities nearby."""
+        return self.limit_warnings(q) + [
+            f"near the {one.family} singularity: {_MEANING[one.family]} is {one.factor + 0.0:.3g}"
+            for one in self.arm.singularities(q)
+            if one.near
         ]
-        return Answer(result, warnings)
+
+    def many(self, values: Mapping[str, Any]) -> Many:
+        """Jacobians for `values["q"]`, and rates for `values["qd"]`, (n, 6) each."""
+        from kr16cli.queries.many_rates import velocity
+
+        return velocity(self, values)
 
     def _rates(self, q: Sequence[float]) -> dict[str, Any]:
         """Roll, pitch and yaw of the flange, B of (3.46) and its inverse, or why it has none."""

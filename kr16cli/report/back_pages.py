@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from kr16cli.report.content import Content, asset_hashes, commands, environment
 from kr16cli.report.page import FULL, LEADING, LEFT, RIGHT, Document, Page
 from kr16cli.report.style import INK, MUTED, RED, STATUS_COLOUR, STATUS_WORD, number
-from kr16cli.report.suite_tables import measured
+from kr16cli.report.suite_tables import measured, sampled
 from kr16cli.report.table import Cell, Column, table
 from kr16cli.report.typeset import BOLD, MONO, PLAIN, Face, wrap
 from kr16cli.verify.records import Result
@@ -21,7 +21,7 @@ def credibility(document: Document, content: Content) -> None:
         "After the factors of NASA-STD-7009B, levels 0 (nothing shown) to 4. A self-assessment by "
         "the developers, not a review by that standard's process; factors recalled by name."
     )
-    columns = (Column("factor", 128), Column("level", 34, "center"), Column("why", 310))
+    columns = (Column("factor", 128), Column("level", 34, "center"), Column("why", 319))
     rows = []
     for row in content.words["credibility"]:
         lowered = failed and "failed" in row
@@ -51,7 +51,7 @@ def traceability(document: Document, content: Content) -> None:
     if functions:
         page = document.with_room(page, 120, title)
         page.heading("Functions and the cases that exercise them")
-        columns = [Column("function", 200), Column("cases", 220), Column("result", 51)]
+        columns = [Column("function", 200), Column("cases", 224), Column("result", 57)]
         rows = []
         for name in functions:
             found = [r for r in content.results if name in r.functions]
@@ -96,12 +96,12 @@ def _ids(results: Sequence[Result]) -> str:
 
 
 def _verdict(results: Sequence[Result]) -> Cell:
-    for status in ("failed", "passed", "skipped"):
-        count = sum(r.status == status for r in results)
-        if count:
-            face = BOLD if status == "failed" else PLAIN
-            return Cell(f"{count} {STATUS_WORD[status]}", face, STATUS_COLOUR[status])
-    return Cell("none", BOLD)
+    counts = {s: sum(r.status == s for r in results) for s in ("failed", "passed", "skipped")}
+    there = [status for status, count in counts.items() if count]
+    if not there:
+        return Cell("none", BOLD)
+    words = ", ".join(f"{counts[status]} {STATUS_WORD[status]}" for status in there)
+    return Cell(words, BOLD if counts["failed"] else PLAIN, STATUS_COLOUR[there[0]])
 
 
 def cases(document: Document, content: Content) -> None:
@@ -121,7 +121,7 @@ def cases(document: Document, content: Content) -> None:
 def _case(document: Document, page: Page, title: str, r: Result) -> Page:
     """One case: name, grade and status, then all that was stated and found."""
     size = 7.0
-    found = f"{measured(r)}; n = {r.samples:,}, seed {r.seed}. {r.evidence}"
+    found = f"{measured(r)}; {sampled(r)}. {r.evidence}"
     worst = r.worst.get("command") or ", ".join(f"{k} {v}" for k, v in r.worst.items())
     parts = [
         f"{r.title}. {r.statement}.",
@@ -132,6 +132,7 @@ def _case(document: Document, page: Page, title: str, r: Result) -> Page:
     last = r.evidence if r.status == "skipped" else found
     ends = [("Found: " if r.status != "skipped" else "Skipped: ") + last]
     if worst:
+        ends[0] = ends[0].rstrip(".") + "."
         ends.append(f"Worst: {worst}")
     words, result = (wrap(" ".join(p), FULL - 10, size) for p in (parts, ends))
     page = document.with_room(page, 18 + LEADING * size * (len(words) + len(result)), title)
@@ -151,7 +152,7 @@ def reproduction(document: Document, content: Content) -> None:
     title = "How to get the same report"
     page = document.page(title)
     page.heading("Commands")
-    for line in commands(content, content.outline.suites):
+    for line in commands(content):
         page.paragraph(line, size=8, face=Face(MONO), x=LEFT + 8, to=RIGHT - 60)
     page.paragraph(
         f"Results: {content.evidence.source}. Equal input gives equal bytes where "

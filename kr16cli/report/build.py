@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kr16cli.errors import InputError, MissingPartError
-from kr16cli.report import sources
+from kr16cli.report import fmus, sources, studies
 from kr16cli.report.content import (
     KINDS,
     Content,
+    Drawing,
+    Evidence,
     LackingError,
+    Outline,
     creation_time,
     outline,
 )
@@ -51,25 +55,38 @@ def gather(
     Args:
         kind: one of KINDS.
         setting: the robot, seed and whether to be quick.
-        paths: files to read results from; with none the suites run.
+        paths: files to read results from; where they hold neither results of suites nor a run,
+            the suites run, and for a page on FMUs one is built and checked.
         progress: told how many cases are done, of how many, and the last.
 
     Raises:
         InputError, FileError: an unknown report, or files that do not fit it.
     """
-    from kr16cli.verify.drawings import draw
-
     plan, created = outline(kind), creation_time()
     data = setting.robot.data
-    if paths:
-        evidence = sources.read(paths, plan.suites, data)
-    else:
-        evidence = sources.run_suites(plan.suites, setting, progress)
-    if evidence.run is not None and "run" not in plan.pages:
+    evidence = sources.read(paths, plan.suites, data) if paths else None
+    if evidence and evidence.run and "run" not in plan.pages:
         raise InputError("a run of kr16 simulate goes with `kr16 report simulation`")
-    names = [name for page in plan.pages for name in DRAWN.get(page, ())]
-    drawings, absent = draw(names, setting)
+    if evidence and evidence.fmus and "fmu" not in plan.pages:
+        raise InputError("a check of kr16 fmu check goes with `kr16 report verification`")
+    if not (evidence and (evidence.results or evidence.run)):
+        evidence = sources.run_suites(plan.suites, setting, progress, evidence)
+        if "fmu" in plan.pages and not evidence.fmus:
+            evidence = replace(evidence, fmus=(fmus.own(data),))
+    drawings, absent = drawn(plan, setting, evidence)
     return Content(plan, data, evidence, drawings, absent, created)
+
+
+def drawn(
+    plan: Outline, setting: Setting, evidence: Evidence
+) -> tuple[dict[str, Drawing], dict[str, str]]:
+    """The drawing data of a report's pages, and for those that could not be made the reason."""
+    from kr16cli.verify.drawings import draw
+
+    names = [name for page in plan.pages for name in DRAWN.get(page, ())]
+    made, absent = draw(names, setting)
+    more, lacking = studies.studied(plan.pages, setting.robot.data, made, evidence.run)
+    return made | more, absent | lacking
 
 
 def build(content: Content) -> bytes:

@@ -7,10 +7,10 @@ import hashlib
 import os
 import platform
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from kr16cli import __version__
 from kr16cli.assets import asset
@@ -20,6 +20,7 @@ from kr16cli.robot import RobotData
 from kr16cli.verify.records import Result
 
 if TYPE_CHECKING:
+    from kr16cli.report.times import Bench
     from kr16cli.simulate.run import Run
 
 Drawing = Mapping[str, Any]
@@ -55,26 +56,12 @@ def outline(kind: str) -> Outline:
     return Outline(kind, own["title"], tuple(own["suites"]), tuple(own["pages"]), words)
 
 
-class Timing(NamedTuple):
-    """Times of one quantity from `kr16 bench`, ns: in a batch, in threads, one call alone.
-
-    `peer` is the fastest library beside it and `ratio` its time over the batch time.
-    """
-
-    name: str
-    batch_ns: float
-    threads_ns: float
-    call_ns: float
-    peer: str
-    ratio: float | None
-
-
 @dataclass(frozen=True)
 class Evidence:
     """Results and where they come from.
 
-    `source` says it in words; `files` are the files read, with their SHA-256; `bench` are wall
-    times, only where a bench file was given.
+    `source` says it in words; `files` are the files read, with their SHA-256; `fmus` are checks
+    of FMUs; `bench` holds wall times, only where a bench file was given.
     """
 
     results: tuple[Result, ...]
@@ -83,8 +70,8 @@ class Evidence:
     source: str
     files: tuple[tuple[str, str], ...] = ()
     run: Run | None = None
-    bench: tuple[Timing, ...] = ()
-    machine: str = ""
+    fmus: tuple[Result, ...] = ()
+    bench: Bench | None = None
 
 
 @dataclass
@@ -102,7 +89,7 @@ class Content:
     @property
     def results(self) -> tuple[Result, ...]:
         """The cases of this report."""
-        return self.evidence.results
+        return (*self.evidence.results, *self.evidence.fmus)
 
     def of(self, *suites: str) -> list[Result]:
         """The cases of suites, in their order."""
@@ -211,16 +198,17 @@ def sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def commands(content: Content, names: Sequence[str]) -> list[str]:
+def commands(content: Content) -> list[str]:
     """What reproduces the report, one command a line."""
     seed = "" if content.evidence.seed is None else f" --seed {content.evidence.seed}"
     quick = " --quick" if content.evidence.quick else ""
     robot = f" --robot {Path(content.data.path).name}"
     if content.data.name == "KUKA KR 16-2":
         robot = ""
-    suites = " ".join(f"--suite {name}" for name in names)
+    suites = " ".join(f"--suite {name}" for name in content.outline.suites)
+    given = "".join(f" --from {name}" for name, _ in content.evidence.files)
     return [
         f"kr16{robot} verify {suites}{quick}{seed}",
-        f"SOURCE_DATE_EPOCH={int(content.created.timestamp())} "
-        f"kr16{robot} report {content.outline.kind} -o {content.outline.kind}.pdf{quick}{seed}",
+        f"SOURCE_DATE_EPOCH={int(content.created.timestamp())} kr16{robot} report "
+        f"{content.outline.kind} -o {content.outline.kind}.pdf{quick}{seed}{given}",
     ]

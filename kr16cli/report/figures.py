@@ -8,13 +8,28 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import StrMethodFormatter
+from matplotlib.axis import Axis
+from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator, StrMethodFormatter
 
 from kr16cli.report.style import BLUE, GREEN, INK, LINES, MUTED, ORANGE, PINK, RED
 
 _HUES = (BLUE, ORANGE, GREEN, PINK, INK, "#56B4E9")
 _MARKS = ("o", "s", "^", "D", "v", "P")
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _HATCHES = ("", "////", "....", "xxxx", "\\\\\\\\", "++++")
+
+
+def powers(axis: Axis) -> None:
+    """Powers of ten on a log axis as plain words, which draw much faster than formulas."""
+
+    def text(value: float, _: int) -> str:
+        exponent = math.log10(value) if value > 0 else math.nan
+        whole = math.isfinite(exponent) and abs(exponent - round(exponent)) < 1e-9
+        return "10" + str(round(exponent)).translate(_RAISED) if whole else ""
+
+    axis.set_major_formatter(FuncFormatter(text))
+    axis.set_minor_formatter(NullFormatter())
+    axis.set_minor_locator(NullLocator())
 
 
 def margin_bars(
@@ -43,7 +58,7 @@ def margin_bars(
     axis.axvline(1.0, color=INK, lw=1.2)
     axis.set_yticks([])
     axis.set_xticks([1e-9, 1e-6, 1e-3, 1.0])
-    axis.minorticks_off()
+    powers(axis.xaxis)
     axis.tick_params(axis="x", labelsize=7)
     axis.spines["left"].set_visible(False)
 
@@ -63,7 +78,7 @@ def residual_histogram(
     axis.set_title(title, fontsize=8, fontweight="normal")
     axis.set_xticks([-16, -14, -12, -10])
     axis.tick_params(labelsize=7)
-    axis.minorticks_off()
+    powers(axis.yaxis)
 
 
 def counts(axis: Axes, values: Sequence[int], count: Sequence[int], label: str) -> None:
@@ -96,10 +111,11 @@ def difference_curve(
     axis.axhline(tolerance, color=INK, ls=(0, (4, 2)), lw=1.2)
     axis.annotate("tolerance of the best step", (h[0], tolerance), (0, 3),
                   textcoords="offset points", ha="right", fontsize=8)  # fmt: skip
-    axis.annotate(f"best: {e[best]:.1e} at h = {h[best]:.0e}", (h[best], e[best]), (0, -12),
+    axis.annotate(f"best: {e[best]:.1e} at h = {h[best]:.0e}", (h[best], e[best]), (0, -24),
                   textcoords="offset points", ha="center", fontsize=8)  # fmt: skip
-    axis.set_ylim(e[best] / 12, None)
-    axis.minorticks_off()
+    axis.set_ylim(e[best] / 30, None)
+    powers(axis.xaxis)
+    powers(axis.yaxis)
     axis.set_xlabel("step h, rad")
     axis.set_ylabel("largest |difference - Jacobian|, m")
     axis.legend(loc="upper center")
@@ -114,8 +130,9 @@ def order_curves(axis: Axes, methods: Sequence[tuple[str, Any, Any, float]]) -> 
         axis.loglog(wide, e[0] * (wide / h[0]) ** order, color=_HUES[k], ls=LINES[k],
                     label=f"slope {order:g}, as claimed")  # fmt: skip
     axis.set_xticks(sorted({h for _, step, _, _ in methods for h in step}))
-    axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    powers(axis.yaxis)
     axis.minorticks_off()
+    axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axis.set_xlabel("step, s")
     axis.set_ylabel("largest error of a joint at the end, rad")
     axis.legend(loc="lower right")
@@ -130,17 +147,23 @@ def history(
         y = np.where(np.asarray(values) > 0, values, np.nan)
         axis.semilogy(time, y, color=_HUES[k], ls=LINES[k], marker=_MARKS[k], ms=3, label=name)
     axis.axhline(tolerance, color=INK, ls=(0, (4, 2)), lw=1.2, label="tolerance")
-    axis.minorticks_off()
+    powers(axis.yaxis)
     axis.set_ylim(None, 3 * max(tolerance, axis.get_ylim()[1]))
     axis.set_xlabel("time, s")
     axis.set_ylabel(label)
     axis.legend(loc="upper right", bbox_to_anchor=(1.0, -0.13), ncols=3)
 
 
-def torque_curves(axis: Axes, time: Any, tau: Any, limit: Any, names: Sequence[str]) -> None:
-    """Torque over limit of every joint, with the limits."""
+def torque_curves(
+    axis: Axes, time: Any, tau: Any, limit: Any, names: Sequence[str], half: Any = None
+) -> None:
+    """Torque over limit of every joint, with the limits, and bands of these half widths."""
     share = np.asarray(tau) / np.asarray(limit)
     for k, name in enumerate(names):
+        if half is not None:
+            wide = np.asarray(half)[:, k] / np.asarray(limit)[k]
+            axis.fill_between(time, share[:, k] - wide, share[:, k] + wide, color=_HUES[k],
+                              alpha=0.22, lw=0)  # fmt: skip
         axis.plot(time, share[:, k], color=_HUES[k], ls=LINES[k], label=name)
         at = int(np.argmax(np.abs(share[:, k])))
         axis.plot(time[at], share[at, k], marker=_MARKS[k], color=_HUES[k])
@@ -181,7 +204,8 @@ def heat_map(
     axis.grid(visible=False)
     bar = axis.figure.colorbar(image, ax=axis, pad=0.03, fraction=0.06)
     bar.ax.tick_params(labelsize=7)
-    bar.ax.minorticks_off()
+    if log:
+        powers(bar.ax.yaxis)
     bar.outline.set_linewidth(0.5)
 
 
@@ -208,3 +232,69 @@ def bars(
     axis.invert_yaxis()
     axis.grid(visible=False, axis="y")
     axis.set_xlim(0, 1.1 * limit)
+
+
+def ratio_bars(
+    axis: Axes, names: Sequence[str], ratios: Sequence[float], label: str, *, least: float = 0.0
+) -> None:
+    """A horizontal bar for each ratio, its value at the end, and a line at 1.
+
+    Ratios below `least` are hatched and of another colour.
+    """
+    y = np.arange(len(names))
+    slow = [r < least for r in ratios]
+    axis.barh(y, ratios, height=0.62, color=[RED if s else BLUE for s in slow],
+              hatch=["////" if s else "" for s in slow], edgecolor="white", lw=0)  # fmt: skip
+    for k, ratio in enumerate(ratios):
+        axis.annotate(f"{ratio:.3g}", (ratio, k), (3, 0), textcoords="offset points",
+                      va="center", fontsize=8)  # fmt: skip
+    axis.axvline(1.0, color=INK, ls=(0, (4, 2)), lw=1.0)
+    axis.set_yticks(y, names, fontsize=7)
+    axis.set_ylim(len(names) - 0.5, -0.5)
+    axis.set_xlim(0, 1.12 * max(1.0, *ratios))
+    axis.set_xlabel(label)
+    axis.grid(visible=False, axis="y")
+
+
+_EXACT = 1e-18
+"""Where a deviation of zero stands on a log axis."""
+
+
+def deviation_dots(
+    axis: Axes,
+    names: Sequence[str],
+    deviations: Sequence[Mapping[str, float | None]],
+    tolerances: Sequence[float],
+    groups: Sequence[str],
+) -> None:
+    """Relative deviations of each row by group on a log axis, and each row's tolerance.
+
+    Zero stands at the left end, what is not finite at the right end. Marks of a row stand one
+    below the other, so that equal ones are all seen.
+    """
+    high = 10 * max(*tolerances, *(v or 0.0 for row in deviations for v in row.values()))
+    apart = 0.8 / max(1, len(groups))
+    for k, group in enumerate(groups):
+        rows = [i for i, row in enumerate(deviations) if group in row]
+        values = [deviations[i][group] for i in rows]
+        x = [high if v is None else max(v, _EXACT) for v in values]
+        y = [i + (k - (len(groups) - 1) / 2) * apart for i in rows]
+        axis.plot(x, y, ls="", marker=_MARKS[k % 6], color=_HUES[k % 6], ms=4,
+                  mfc=_HUES[k % 6] if k < 6 else "none", label=group, clip_on=False)  # fmt: skip
+    middles = np.arange(len(names))
+    axis.vlines(tolerances, middles - 0.45, middles + 0.45, color=INK, lw=1.2,
+                ls=(0, (4, 2)), label="tolerance")  # fmt: skip
+    axis.set_xscale("log")
+    axis.set_xlim(_EXACT, high)
+    axis.set_xticks([10.0**e for e in range(-18, round(math.log10(high)) + 1, 3)])
+    powers(axis.xaxis)
+    plain = axis.xaxis.get_major_formatter()
+    axis.xaxis.set_major_formatter(
+        FuncFormatter(lambda v, at: "0" if v <= 1.01 * _EXACT else plain(v, at))
+    )
+    axis.set_yticks(middles, names, fontsize=7)
+    axis.set_ylim(len(names) - 0.5, -0.5)
+    axis.set_xlabel("largest deviation / size of the quantity (0: none)")
+    axis.grid(visible=False, axis="y")
+    axis.legend(loc="upper center", bbox_to_anchor=(0.4, -32.0 / axis.bbox.height), ncols=8,
+                handletextpad=0.3, columnspacing=1.2)  # fmt: skip

@@ -27,7 +27,7 @@ def verdict(document: Document, content: Content) -> None:
     _worst(document, page, content)
     _grades(page, content)
     page.heading("What is not shown")
-    page.bullets(list(content.words["not_shown"]), size=8.5)
+    page.bullets([*content.words["not_shown"], *_left_undone(content)], size=8.5)
     page.paragraph(content.words["statement"], face=BOLD, size=8.5)
     page.heading("Identity")
     pairs(
@@ -37,10 +37,18 @@ def verdict(document: Document, content: Content) -> None:
             ("model, SHA-256", content.data.sha256),
             ("kr16cli", __version__),
             ("results", content.evidence.source),
+            ("samples", _extent(content)),
             ("seed", "not stated" if content.evidence.seed is None else str(content.evidence.seed)),
             ("report of", f"{content.created:%Y-%m-%d}"),
         ],
     )
+
+
+def _extent(content: Content) -> str:
+    quick = content.evidence.quick
+    drawn = sum(r.samples for r in content.results)
+    kind = "" if quick is None else "quick run, " if quick else "full run, "
+    return f"{kind}{drawn:,} samples in all" if drawn else "none"
 
 
 def _answer(page: Page, content: Content) -> None:
@@ -60,11 +68,23 @@ def _answer(page: Page, content: Content) -> None:
     page.write(
         LEFT,
         page.y,
-        f"{passed} passed · {failed} failed · {skipped} skipped"
-        + (" (reasons in the list of cases)" if skipped else ""),
+        f"{passed} passed · {failed} failed · {skipped} skipped",
         size=10,
     )
     page.y += 38
+
+
+def _left_undone(content: Content) -> list[str]:
+    """What this very report lacks: skipped checks, samples a quick run saves."""
+    skipped = [r for r in content.results if r.status == "skipped"]
+    reasons = list(dict.fromkeys(r.evidence for r in skipped))
+    said = []
+    if skipped:
+        more = "; others in the list of cases" if len(reasons) > 2 else ""
+        said.append(f"Skipped, {len(skipped)}: {'; '.join(reasons[:2])}{more}.")
+    if content.evidence.quick:
+        said.append("A quick run: fewer samples and shorter motions than a full one.")
+    return said
 
 
 def _worst(document: Document, page: Page, content: Content) -> None:
@@ -73,8 +93,8 @@ def _worst(document: Document, page: Page, content: Content) -> None:
         return
     page.heading(("Failed, or n" if content.count("failed") else "N") + "earest to failing")
     columns = (
-        Column("check", 196), Column("error / tolerance", 130, "right"),
-        Column("margin used", 62, "right"), Column("status", 60),
+        Column("check", 236), Column("error / tolerance", 110, "right"),
+        Column("tolerance used", 76, "right"), Column("status", 52),
     )  # fmt: skip
     rows: list[list[str | Cell]] = [
         [
@@ -182,7 +202,7 @@ def poses(document: Document, content: Content) -> None:
         robot_figures.joint_axes(
             axis, drawing["axis_points"][k], drawing["axis_directions"][k], names
         )
-        robot_figures.triad(axis, (-0.55, 0.0), ("x", "z"), 0.22)
+        robot_figures.triad(axis, (-0.68, 0.0), ("x", "z"), 0.2)
         if k == 1:
             _home_lengths(axis, points, drawing["lengths"])
         axis.set_xlim(-0.75, 1.95)
@@ -210,18 +230,18 @@ def _home_lengths(axis: Any, points: Any, lengths: Mapping[str, float]) -> None:
     draw(axis, (0.0, at["s"][1]), at["s"], text["a1"], (0.0, -0.16))
     draw(axis, at["s"], (at["s"][0], at["e"][1]), text["a2"], (-0.2, 0.0), "left")
     draw(axis, (at["e"][0], at["w"][1]), at["w"], text["d4"], (0.0, -0.14))
-    draw(axis, at["w"], at["f"], text["d6"], (0.0, -0.26))
+    draw(axis, at["w"], at["f"], text["d6"], (0.0, -0.26), "after")
     draw(axis, (at["f"][0], at["w"][1]), (at["f"][0], at["e"][1]), text["a3"], (0.22, 0.0), "right")
 
 
 def _frames(document: Document, page: Page, drawing: Mapping[str, Any]) -> None:
-    columns = (Column("frame of Table 3.1, at home", 120), Column("origin x y z, mm", 110),
+    columns = (Column("frame of Table 3.1, at home", 126), Column("origin x y z, mm", 112),
                Column("x axis", 76), Column("y axis", 76), Column("z axis", 76))  # fmt: skip
     rows = []
     for i, (origin, axes) in enumerate(
         zip(drawing["frame_origins"][1], drawing["frame_axes"][1], strict=True)
     ):
-        cells = [" ".join(f"{round(v) + 0:+d}" for v in a) for a in axes]
+        cells = [" ".join(f"{round(v):+d}" if round(v) else "0" for v in a) for a in axes]
         rows.append([f"frame {i}", " ".join(f"{mm(v) + 0.0:.0f}" for v in origin + 0.0), *cells])
     table(document, page, "Frames", columns, rows, size=7.5, pad=1.2)
 
@@ -250,7 +270,7 @@ def margins(document: Document, content: Content) -> None:
     page.paragraph(
         "Sorted by margin, error over tolerance. Bars on a log scale from 1e-9; the line marks "
         "the tolerance; hatched bars FAILED. Error 0: exact, or a count of wrong results that "
-        "found none."
+        "found none. Two units, as in m, 1: the larger of both parts, lengths and rotations."
     )
     rows: list[list[str | Cell]] = [
         [r.id, r.grade, f"{r.samples:,}", number(r.error), number(r.tolerance), r.unit,

@@ -78,7 +78,10 @@ def closure(document: Document, content: Content) -> None:
             )
             if k == 0:
                 axis.set_ylabel("poses", fontsize=7.5)
+            if start + columns >= len(drawn):
+                axis.set_xlabel("log10 of the error", fontsize=7.5, labelpad=1)
         page.y += height + 45
+    page.y += 8
     page.y += 2
     page.caption(
         "Closing error of the worst branch of each pose as log10 of m and rad; dashed: tolerance. "
@@ -105,11 +108,14 @@ def branches(document: Document, content: Content) -> None:
     """Eight solutions of one pose as stick figures."""
     drawing = content.drawing("branches")
     count = int(np.sum(drawing["found"]))
-    page = document.page(f"One pose, {count} configurations: arm, elbow and wrist each either way")
+    page = document.page(f"One pose, {count} configurations: arm, elbow, wrist each either way")
     pose = " ".join(f"{v:.3f}" for v in drawing["pose_mm_deg"])
     page.paragraph(f"kr16 ik {pose}", face=Face(MONO), size=8)
     points = np.asarray(drawing["points"])[np.asarray(drawing["found"])]
-    ends = np.concatenate([points.reshape(-1, 2), np.asarray(drawing["floor"])])
+    arrows = np.asarray(drawing["a5_ends"])[np.asarray(drawing["found"])]
+    ends = np.concatenate(
+        [points.reshape(-1, 2), arrows.reshape(-1, 2), np.asarray(drawing["floor"])]
+    )
     low, high = ends.min(axis=0) - 0.08, ends.max(axis=0) + 0.08
     wide = FULL / 4 - 6
     height = min(wide * (high[1] - low[1]) / (high[0] - low[0]), 240.0)
@@ -236,7 +242,7 @@ def workspace(document: Document, content: Content) -> None:
 
 
 def _figures(document: Document, page: Page, title: str, rows: Any) -> None:
-    columns = (Column("figure", 158), Column("published", 50, "right"),
+    columns = (Column("figure", 144), Column("published", 50, "right"),
                Column("computed", 50, "right"), Column("difference", 50, "right"),
                Column("tolerance", 44, "right"), Column("unit", 22), Column("status", 52),
                Column("source", 32))  # fmt: skip

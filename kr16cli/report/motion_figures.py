@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from kr16cli.errors import MissingPartError
 from kr16cli.robot import JointData
 from kr16cli.simulate.run import Run
+from kr16cli.study.bands import Bands
 from kr16cli.units import RAD_PER_DEG, mm
 
 if TYPE_CHECKING:
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 
 _A4 = (8.27, 11.69)
 _INK, _WANTED, _LIMIT = "#1f3b73", "#c8501e", "#9a9a9a"
+_BAND: dict[str, Any] = {"color": _INK, "alpha": 0.22, "lw": 0}
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.titlesize": 9.0,
@@ -57,10 +60,10 @@ def _styled() -> Iterator[None]:
         yield
 
 
-def motion_pdf(run: Run, joints: Sequence[JointData]) -> bytes:
+def motion_pdf(run: Run, joints: Sequence[JointData], bands: Bands | None = None) -> bytes:
     """A PDF of two pages: the joints, and the flange with errors and energies.
 
-    Its bytes depend on the run alone: it carries no date.
+    Its bytes depend on what is given alone: it carries no date.
     """
     from matplotlib.backends.backend_pdf import PdfPages
 
@@ -68,17 +71,24 @@ def motion_pdf(run: Run, joints: Sequence[JointData]) -> bytes:
     about = {"Title": f"{name}, {run.robot}", "Creator": "kr16 simulate", "CreationDate": None}
     out = BytesIO()
     with _styled(), PdfPages(out, metadata=about) as pages:
-        for figure in (joint_figure(run, joints), flange_figure(run)):
+        for figure in (joint_figure(run, joints, bands), flange_figure(run)):
             pages.savefig(figure)
     return out.getvalue()
 
 
-def joint_figure(run: Run, joints: Sequence[JointData]) -> Figure:
-    """Angle, speed and torque of each joint over time, with reference and limits."""
+def joint_figure(run: Run, joints: Sequence[JointData], bands: Bands | None = None) -> Figure:
+    """Angle, speed and torque of each joint over time, with reference and limits.
+
+    Args:
+        run: the motion.
+        joints: the robot's.
+        bands: of the torque; their words stand below the figure.
+    """
     with _styled():
         figure = _page()
         figure.suptitle(_heading(run), fontsize=10.0)
         axes = figure.subplots(6, 3, sharex=True)
+        half = None if bands is None else bands.half
         for i, joint in enumerate(joints):
             angle, speed, torque = axes[i]
             angle.set_ylabel(joint.name, rotation=0, ha="right", va="center", fontweight="bold")
@@ -87,6 +97,9 @@ def joint_figure(run: Run, joints: Sequence[JointData]) -> Figure:
             _settle(speed)
             _limits(speed, _degrees(joint.speed))
             _curve(torque, run.time, run.tau[:, i])
+            if half is not None:
+                low, high = run.tau[:, i] - half[:, i], run.tau[:, i] + half[:, i]
+                torque.fill_between(run.time, low, high, **_BAND)
             _settle(torque)
             _limits(torque, joint.torque)
             _mark_events(axes[i], run, joint.name)
@@ -94,7 +107,9 @@ def joint_figure(run: Run, joints: Sequence[JointData]) -> Figure:
             axis.set_title(title)
         for axis in axes[-1]:
             axis.set_xlabel("time, s")
-        figure.legend(*_legend(run), loc="outside lower center", ncols=4)
+        words = None if bands is None else fill(bands.words, 120)
+        figure.legend(*_legend(run, banded=half is not None), loc="outside lower center",
+                      ncols=5, title=words, title_fontsize=7.5)  # fmt: skip
     return figure
 
 
@@ -184,12 +199,15 @@ def _mark_events(axes: Sequence[Axes], run: Run, name: str) -> None:
                 axis.axvline(event.time, color="#2c8c5a", lw=0.8)
 
 
-def _legend(run: Run) -> tuple[list[Any], list[str]]:
+def _legend(run: Run, *, banded: bool) -> tuple[list[Any], list[str]]:
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
-    known = [("motion", Line2D([], [], color=_INK))]
+    known: list[tuple[str, Any]] = [("motion", Line2D([], [], color=_INK))]
     if run.q_ref is not None:
         known.append(("reference", Line2D([], [], color=_WANTED, ls=(0, (4, 3)))))
+    if banded:
+        known.append(("band", Patch(**_BAND)))
     known.append(("limit, where near", Line2D([], [], color=_LIMIT, ls=":")))
     if run.events:
         known.append(("limit passed, target reached", Line2D([], [], color="#2c8c5a", lw=0.8)))

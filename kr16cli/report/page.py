@@ -8,11 +8,9 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Mapping, Sequence
 from io import BytesIO
-from typing import Any, NamedTuple, cast
+from typing import Any
 
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -25,10 +23,10 @@ from kr16cli.report.typeset import (
     Face,
     Formula,
     printable,
-    properties,
     width,
     wrap,
 )
+from kr16cli.report.words import Piece, Words
 
 WIDTH, HEIGHT = 595.276, 841.89
 LEFT, RIGHT, TOP, BOTTOM = 50.0, WIDTH - 50.0, 48.0, HEIGHT - 52.0
@@ -37,51 +35,13 @@ LEADING = 1.32
 """Line distance over size."""
 
 
-class Piece(NamedTuple):
-    """A line where it stands: left end and baseline, and its look."""
-
-    x: float
-    base: float
-    text: str
-    face: Face
-    size: float
-    color: str
-
-    @property
-    def box(self) -> tuple[float, float, float, float]:
-        """Left, top, right, bottom of the letters, points."""
-        right = self.x + width(self.text, self.size, self.face)
-        return self.x, self.base - 0.76 * self.size, right, self.base + 0.24 * self.size
-
-
-class Lines(Artist):
-    """All words of a page in one artist: one `Text` for each would take several times as long."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.pieces: list[Piece] = []
-        self.set_zorder(3)
-
-    def draw(self, renderer: RendererBase) -> None:
-        """Hand the words to the renderer."""
-        gc = renderer.new_gc()
-        scale = float(cast("float", renderer.points_to_pixels(1.0)))
-        for piece in self.pieces:
-            gc.set_foreground(piece.color)
-            y = piece.base if renderer.flipy() else HEIGHT - piece.base
-            renderer.draw_text(
-                gc, piece.x * scale, y * scale, piece.text, properties(piece.face, piece.size), 0.0
-            )
-        gc.restore()
-
-
 class Page:
     """One sheet with a cursor `y`, the top of the free space."""
 
     def __init__(self, figure: Figure | None = None) -> None:
         self.figure = figure or Figure(figsize=(WIDTH / 72, HEIGHT / 72), dpi=72)
         self.y = TOP
-        self.words = Lines()
+        self.words = Words(HEIGHT)
         self.figure.add_artist(self.words)
         self._rules: list[list[tuple[float, float]]] = []
 

@@ -7,13 +7,17 @@ from collections.abc import Callable, Mapping
 from kr16cli.report import back_pages as back
 from kr16cli.report import chapter_pages as chapter
 from kr16cli.report import dynamics_pages as dynamics
+from kr16cli.report import fmu_pages as fmus
 from kr16cli.report import front_pages as front
 from kr16cli.report import kinematics_pages as kinematics
+from kr16cli.report import speed_pages as times
+from kr16cli.report import trust_pages as trust
 from kr16cli.report.content import Content
 from kr16cli.report.page import Document
 
 PAGES: Mapping[str, Callable[[Document, Content], None]] = {
     "verdict": front.verdict,
+    "trust": trust.trust,
     "identity": front.identity,
     "poses": front.poses,
     "margins": front.margins,
@@ -31,7 +35,8 @@ PAGES: Mapping[str, Callable[[Document, Content], None]] = {
     "energy": dynamics.energy,
     "engines": dynamics.engines,
     "run": dynamics.run,
-    "speed": dynamics.speed,
+    "fmu": fmus.fmu,
+    "speed": times.speed,
     "credibility": back.credibility,
     "traceability": back.traceability,
     "cases": back.cases,

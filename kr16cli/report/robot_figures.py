@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from kr16cli.report.style import BLUE, INK, MUTED, ORANGE
+from kr16cli.report.style import BLUE, INK, MUTED, ORANGE, SHADE
 
 _LINK: dict[str, Any] = {
     "color": "#8a97a8",
@@ -61,7 +61,7 @@ def dimension(
 ) -> None:  # fmt: skip
     """A measured length: a double arrow from start to end, moved by `shift`, with its value.
 
-    `place` of the value: above the arrow, left of it (turned), or right of it.
+    `place` of the value: above the arrow, left of it (turned), right of it, or after its end.
     """
     a = (start[0] + shift[0], start[1] + shift[1])
     b = (end[0] + shift[0], end[1] + shift[1])
@@ -73,8 +73,10 @@ def dimension(
         "above": ((0, 3), "center", "bottom", 0),
         "left": ((-4, 0), "right", "center", 90),
         "right": ((6, 0), "left", "center", 0),
+        "after": ((4, 0), "left", "center", 0),
     }[place]
-    axis.annotate(text, middle, offset, textcoords="offset points", ha=across, va=up,
+    anchor = b if place == "after" else middle
+    axis.annotate(text, anchor, offset, textcoords="offset points", ha=across, va=up,
                   fontsize=8, rotation=turn)  # fmt: skip
 
 
@@ -135,8 +137,9 @@ def spread_labels(axis: Axes, places: Any, names: Sequence[str]) -> None:
 def section(axis: Axes, drawing: Mapping[str, Any]) -> None:
     """The section of the workspace with its edges and the arm at home."""
     x, z = np.asarray(drawing["x"]), np.asarray(drawing["z"])
-    shade = np.where(drawing["inside"], 0.0, np.nan)
-    axis.pcolormesh(x, z, shade, cmap="Blues", vmin=-0.35, vmax=1.6, rasterized=True, zorder=0)
+    inside = np.asarray(drawing["inside"], dtype=float)
+    middles = [(edges[1:] + edges[:-1]) / 2 for edges in (x, z)]
+    axis.contourf(*middles, inside, levels=[0.5, 1.5], colors=[SHADE], zorder=0)
     dashes = ("-", (0, (6, 2)), (0, (1.5, 1.5)), "-.", (0, (9, 2, 2, 2)))
     for k, (name, line) in enumerate(drawing["edges"].items()):
         p = np.asarray(line)

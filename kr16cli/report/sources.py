@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from kr16cli.errors import FileError, InputError
-from kr16cli.report.content import Evidence, Timing, sha256
+from kr16cli.report import fmus, times
+from kr16cli.report.content import Evidence, sha256
 from kr16cli.robot import RobotData
 from kr16cli.simulate.run import load_run
 from kr16cli.verify import registry
 from kr16cli.verify.records import Result, Setting
 
 _SCHEMA = "kr16.verify/1"
-_TIMES = "kr16.bench/1"
 _NEEDED = ("id", "group", "title", "method", "grade", "tolerance", "status", "evidence")
 _PLAIN: dict[str, Any] = {
     "statement": "", "regime": "", "unit": "", "reason": "", "error": None, "samples": 0,
@@ -25,9 +25,19 @@ _PLAIN: dict[str, Any] = {
 
 
 def run_suites(
-    suites: Sequence[str], setting: Setting, progress: Callable[[int, int, str], None] | None = None
+    suites: Sequence[str],
+    setting: Setting,
+    progress: Callable[[int, int, str], None] | None = None,
+    given: Evidence | None = None,
 ) -> Evidence:
-    """Run the suites; `progress` is told how many cases are done, of how many, and the last."""
+    """Run the suites, beside what files gave.
+
+    Args:
+        suites: by name.
+        setting: what they are run with.
+        progress: told how many cases are done, of how many, and the last.
+        given: what files gave, kept.
+    """
     cases = registry.cases(suites)
     results = []
     for result in registry.run(cases, setting):
@@ -35,11 +45,18 @@ def run_suites(
         if progress:
             progress(len(results), len(cases), result.id)
     words = "quick run: fewer samples" if setting.quick else "full run"
-    return Evidence(tuple(results), setting.seed, setting.quick, f"run for this report ({words})")
+    evidence = given or Evidence((), None, None, "")
+    return replace(
+        evidence,
+        results=tuple(results),
+        seed=setting.seed,
+        quick=setting.quick,
+        source=f"run for this report ({words})",
+    )
 
 
 def read(paths: Sequence[str | Path], suites: Sequence[str], data: RobotData) -> Evidence:
-    """What files hold: results of `kr16 verify --json`, a run's npz, times of `kr16 bench`.
+    """What files hold: results of `kr16 verify --json`, a run's npz, FMU checks, times.
 
     Args:
         paths: the files, in any order; later results of a case replace earlier ones.
@@ -51,6 +68,7 @@ def read(paths: Sequence[str | Path], suites: Sequence[str], data: RobotData) ->
         InputError: results of another model.
     """
     found = Evidence((), None, None, "read from " + ", ".join(Path(p).name for p in paths))
+    lacking: str | Path | None = None
     for path in paths:
         content = _bytes(path)
         found = replace(found, files=(*found.files, (Path(path).name, sha256(content))))
@@ -58,11 +76,14 @@ def read(paths: Sequence[str | Path], suites: Sequence[str], data: RobotData) ->
             run = load_run(path)
             _same_model(path, run.model_sha256, run.robot, data)
             found = replace(found, run=run)
-        else:
-            found = _joined(found, path, _table(path, content), suites, data)
-    if not (found.results or found.run):
-        raise FileError(paths[0], f"holds no case of the suites {', '.join(suites)}")
-    return found
+            continue
+        table = _table(path, content)
+        found = _joined(found, path, table, suites, data)
+        if table["schema"] == _SCHEMA and not found.results:
+            lacking = path
+    if lacking and not (found.results or found.run):
+        raise FileError(lacking, f"holds no case of the suites {', '.join(suites)}")
+    return replace(found, fmus=tuple(fmus.numbered(found.fmus)))
 
 
 def _joined(
@@ -70,17 +91,22 @@ def _joined(
     data: RobotData,
 ) -> Evidence:  # fmt: skip
     """The evidence with a JSON file added."""
-    if table.get("schema") == _TIMES:
-        return replace(found, bench=_timings(path, table), machine=_machine(table))
-    if table.get("schema") != _SCHEMA:
+    schema = table.get("schema")
+    if schema not in (_SCHEMA, times.SCHEMA, fmus.ONE, fmus.TABLE):
         raise FileError(
-            path, "is neither a result of kr16 verify --json or kr16 bench --json nor a run"
+            path,
+            "is neither a result of kr16 verify, kr16 fmu check or kr16 bench (--json) nor a run",
         )
-    _same_model(path, str(table.get("model_sha256")), str(table.get("robot")), data)
+    if schema == _SCHEMA or table.get("model_sha256") is not None:  # FMUs of others name none
+        _same_model(path, str(table.get("model_sha256")), str(table.get("robot")), data)
     try:
+        if schema == times.SCHEMA:
+            return replace(found, bench=times.read(table))
+        if schema != _SCHEMA:
+            return replace(found, fmus=(*found.fmus, *fmus.cases(table)))
         cases = [_result(entry) for entry in table["result"]["cases"]]
-    except (KeyError, TypeError, ValueError) as error:
-        raise FileError(path, f"holds a case that is not whole: {error}") from None
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise FileError(path, f"holds a result that is not whole: {error}") from None
     asked = table.get("input") or {}
     kept = {r.id: r for r in (*found.results, *cases) if r.group in suites}
     return replace(
@@ -127,31 +153,3 @@ def _same_model(path: str | Path, sha: str, name: str, data: RobotData) -> None:
             f"{path} is of {name}, model {sha[:12]}; the robot is {data.name}, model "
             f"{data.sha256[:12]}; give its parameter file with --robot"
         )
-
-
-def _timings(path: str | Path, table: Mapping[str, Any]) -> tuple[Timing, ...]:
-    """Rows of a file of `kr16 bench --json`."""
-    try:
-        rows = [_timing(row) for row in table["result"]["rows"]]
-    except (KeyError, TypeError, ValueError) as error:
-        raise FileError(path, f"holds times that are not whole: {error}") from None
-    return tuple(rows)
-
-
-def _timing(row: Mapping[str, Any]) -> Timing:
-    peers = row.get("peers") or {}
-    return Timing(
-        str(row["quantity"]),
-        float(row["batch_ns"]),
-        float(row["threads_ns"]),
-        float(row["call_ns"]),
-        peer=min(peers, key=lambda name: float(peers[name])) if peers else "",
-        ratio=None if row.get("ratio") is None else float(row["ratio"]),
-    )
-
-
-def _machine(table: Mapping[str, Any]) -> str:
-    result, given = table["result"], table.get("input") or {}
-    about = result.get("machine") or {}
-    parts = [f"{key} {value}" for key, value in (*about.items(), *given.items())]
-    return f"engine {result.get('engine')}, " + ", ".join(parts)

@@ -10,7 +10,7 @@ from kr16cli.assets import asset
 INK, MUTED, RULE = "#1a1a1a", "#5c5c5c", "#bdbdbd"
 BLUE, ORANGE, GREEN, PINK = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 RED = "#B00020"
-TINT = "#eef3f8"
+TINT, SHADE = "#eef3f8", "#d5e4f3"
 
 STATUS_WORD = {"passed": "passed", "failed": "FAILED", "skipped": "skipped"}
 STATUS_COLOUR = {"passed": INK, "failed": RED, "skipped": MUTED}

@@ -41,10 +41,11 @@ def claims(document: Document, page: Page, title: str, results: Sequence[Result]
     rows: list[list[str | Cell]] = []
     before = ""
     for r in results:
+        claim = r.title.removesuffix(f": {r.regime}")  # the next column says it
         regime = "as above" if r.regime == before and len(before) > 24 else r.regime
         before = r.regime
         count = f"{r.samples:,}" if r.samples else "-"
-        rows.append([r.title, regime, r.grade, count, measured(r), status_cell(r)])
+        rows.append([claim, regime, r.grade, count, measured(r), status_cell(r)])
     page, _ = table(document, page, title, _CLAIMS, rows, size=7.2)
     for r in results:
         if r.status == "failed":
@@ -55,7 +56,8 @@ def claims(document: Document, page: Page, title: str, results: Sequence[Result]
 
 def sampled(result: Result) -> str:
     """Number of samples and seed, for a caption."""
-    return f"n = {result.samples:,}, seed {result.seed}"
+    drawn = result.group != "fmu"  # its inputs are the same waves every time
+    return f"n = {result.samples:,}" + (f", seed {result.seed}" if drawn else "")
 
 
 def worst_point(result: Result) -> str:

@@ -136,15 +136,14 @@ _TOKEN = re.compile(
     r"|(?P<script>[_^])(?P<body>\([^()]*\)|\{[^{}]*\}|-?[A-Za-z0-9]+(,[A-Za-z0-9]+(_[a-z]+)?)*)"
     r"|(?P<sign>\|\||<=|>=|!=|[*'-])|(?P<rest>.)"
 )
-_PROSE = re.compile(r"[(\"']?[A-Za-z][a-z]+('s)?[)\"',.;:]*|a|[A-Z]{2,}")
+_PROSE = re.compile(r"[(\"']?[A-Za-z][a-z]+(-[a-z]{3,})*('s)?[)\"',.;:]*|a|[A-Z]{2,}")
 _LOW, _HIGH, _SMALL = -0.18, 0.36, 0.7
 
 
 def formula(text: str, limit: float, size: float) -> list[Formula]:
     """Lines of a plain formula (`c23*c6`, `T_2[3]`, `o_c`) with indices set; prose as it is."""
     words = text.split()
-    last = len(words) - 1
-    done = [_word(w, sign=0 < i < last and w == "x") for i, w in enumerate(words)]
+    done = [_word(w, sign=_crosses(words, i)) for i, w in enumerate(words)]
     lines: list[list[Formula]] = [[]]
     used, space = 0.0, _unit_width(" ", PLAIN) / _UNIT
     for word in done:
@@ -154,6 +153,18 @@ def formula(text: str, limit: float, size: float) -> list[Formula]:
         used += word.width + (space if lines[-1] else 0.0)
         lines[-1].append(word)
     return [_line(words, space) for words in lines]
+
+
+def _crosses(words: Sequence[str], i: int) -> bool:
+    """Whether a word is the sign of a product: an x between factors, not the name of a number."""
+    if words[i] != "x" or not 0 < i < len(words) - 1:
+        return False
+    return not _is_prose(words[i - 1]) and words[i + 1][0] not in "<>=!"
+
+
+def _is_prose(word: str) -> bool:
+    bare = word.strip("(),.;:'\"")
+    return bool(_PROSE.fullmatch(word)) and bare not in _GREEK and bare not in _NAMED
 
 
 def _line(words: Sequence[Formula], space: float) -> Formula:
@@ -169,10 +180,9 @@ def _line(words: Sequence[Formula], space: float) -> Formula:
 
 @lru_cache(maxsize=4000)
 def _word(word: str, *, sign: bool) -> Formula:
-    bare = word.strip("(),.;:'\"")
     if sign:
         return _set([(_TIMES, PLAIN, "")])
-    if _PROSE.fullmatch(word) and bare not in _GREEK and bare not in _NAMED:
+    if _is_prose(word):
         return _set([(printable(word), PLAIN, "")])
     return _set([part for m in _TOKEN.finditer(word) for part in _parts(m)])
 

@@ -113,6 +113,7 @@ class Setpoint:
     ) -> None:
         self._arm = arm
         self._target = JointTarget(list(q), list(qd), list(qdd))
+        self._flange: TaskTarget | None = None
 
     def joint(self, t: float) -> JointTarget:
         """The target of the joints."""
@@ -120,7 +121,9 @@ class Setpoint:
 
     def task(self, t: float) -> TaskTarget:
         """The target of the flange."""
-        return task_target(self._arm, self._target)
+        if self._flange is None:
+            self._flange = task_target(self._arm, self._target)
+        return self._flange
 
 
 def rk4_step(rates: Rates, t: float, state: Sequence[float], h: float) -> list[float]:

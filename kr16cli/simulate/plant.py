@@ -141,8 +141,16 @@ class Plant:
         self, t: float, q: Sequence[float], qd: Sequence[float], tau: Sequence[float]
     ) -> list[float]:
         """Joint accelerations (rad/s2) under torques tau (N m) that the drives give."""
-        parts = (tau, self.external(t, q), self.contact(q, qd))
-        return self.arm.forward_dynamics(q, qd, [sum(v) for v in zip(*parts, strict=True)])
+        return self.arm.forward_dynamics(q, qd, self._total(tau, self._others(t, q, qd)))
+
+    def _others(self, t: float, q: Sequence[float], qd: Sequence[float]) -> list[list[float]]:
+        """Torques of the wrench and of the stops, where there are such."""
+        found = [self.external(t, q)] if self.wrench else []
+        return [*found, self.contact(q, qd)] if self._stops else found
+
+    @staticmethod
+    def _total(tau: Sequence[float], others: Sequence[Sequence[float]]) -> Sequence[float]:
+        return [sum(v) for v in zip(tau, *others, strict=True)] if others else tau
 
     def rates(self, t: float, state: Any) -> list[float]:
         """Time derivative of a state (12 to 16 numbers); NaNs where it lies beyond the floats.
@@ -152,13 +160,17 @@ class Plant:
         y = state.tolist() if hasattr(state, "tolist") else list(state)
         q, qd = y[:6], y[6:12]
         try:
-            tau = self.applied(self.torque(t, q, qd), qd)
-            pushed, stopped = self.external(t, q), self.contact(q, qd)
-            total = [sum(v) for v in zip(tau, pushed, stopped, strict=True)]
-            qdd = self.arm.forward_dynamics(q, qd, total)
+            tau = self.torque(t, q, qd)
+            if self._bound:
+                tau = self.applied(tau, qd)
+            others = self._others(t, q, qd)
+            qdd = self.arm.forward_dynamics(q, qd, self._total(tau, others))
+            if len(y) == 12:
+                return [*qd, *qdd]
             lost = _power(self.arm.friction(qd), qd) if self.arm.drives else 0.0
-            works = (_power(tau, qd), lost, _power(pushed, qd), _power(stopped, qd))
-            return [*qd, *qdd, *works][: len(y)]
+            pushed = _power(others[0], qd) if self.wrench else 0.0
+            stopped = _power(others[-1], qd) if self._stops else 0.0
+            return [*qd, *qdd, _power(tau, qd), lost, pushed, stopped][: len(y)]
         except (ArithmeticError, ValueError) as error:  # the solver steps back
             self.trouble = self.trouble or str(error)
             return [math.nan] * len(y)

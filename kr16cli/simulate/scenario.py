@@ -128,7 +128,7 @@ def load_scenario(path: str | Path) -> Scenario:
         FileError: the file cannot be read or is no TOML.
         ParameterError: the first broken rule, with key, value and rule.
     """
-    file = _find(path)
+    file = scenario_file(path)
     return parse_scenario(read_table(file), str(file), file.parent)
 
 
@@ -149,7 +149,7 @@ def with_options(
     table: dict[str, Any] = {"schema": SCHEMA, "name": "options", "duration_s": 1.0}
     folder = Path()
     if path is not None:
-        file = _find(path)
+        file = scenario_file(path)
         table = read_table(file)
         parse_scenario(table, str(file))
         folder = file.parent
@@ -206,7 +206,7 @@ def parse_scenario(table: Mapping[str, Any], path: str, folder: Path = Path()) -
     )
 
 
-def _find(path: str | Path) -> Path:
+def scenario_file(path: str | Path) -> Path:
     """The file meant: a path, or a bare name among the shipped scenarios."""
     file = Path(path)
     if file.is_file():

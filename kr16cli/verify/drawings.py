@@ -297,11 +297,15 @@ def torques(setting: Setting) -> Drawing:
     share = np.abs(robot.gravity(grid)) / limit
     return {
         "time": s[:, 0] * duration,
+        "q": q,
+        "qd": qd,
+        "qdd": qdd,
         "tau": tau,
         "limit": limit,
         "names": [j.name for j in data.joints],
         "speed_share": np.abs(qd).max(axis=0) / speed,
         "torque_share": np.abs(tau).max(axis=0) / limit,
+        "payload": robot.payload,
         "payload_kg": load,
         "com_mm": (aside * 1e3, 0.0, ahead * 1e3),
         "start_deg": np.degrees(start),

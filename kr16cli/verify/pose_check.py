@@ -25,12 +25,13 @@ ORIENTATION_DEG = 0.1
 
 _LEVER = 0.5  # m: weighs a rotation error as what it moves half a metre away
 _LEAST = 4
+_LEAST_ANGLE = units.rad(ORIENTATION_DEG)
 _VARIED = 1e-3  # singular value, over the largest, below which base and tool cannot be told apart
 
 
 @dataclass(frozen=True)
 class PoseReport:
-    """What recorded poses say: results, the fit, and one row a pose (mm, degrees)."""
+    """What recorded poses say: results, the fit, and one row a pose, in mm and degrees or SI."""
 
     results: list[Result]
     base: list[float]
@@ -39,13 +40,42 @@ class PoseReport:
     rows: list[dict[str, Any]]
 
 
-def check(data: RobotData, q: Array, poses: Array) -> PoseReport:
+@dataclass(frozen=True)
+class _Shown:
+    """In which units results are told."""
+
+    length: str
+    angle: str
+
+    @property
+    def si(self) -> bool:
+        return self.length == "m"
+
+    def gaps(self, prefix: str, position: float, angle: float) -> dict[str, float]:
+        """A distance (m) and an angle (rad) by names that say their units."""
+        names = (f"{prefix}position_{self.length}", f"{prefix}orientation_{self.angle}")
+        values = (position, angle) if self.si else (units.mm(position), units.deg(angle))
+        return dict(zip(names, map(float, values), strict=True))
+
+    def limits(self) -> tuple[tuple[str, str, float, str], ...]:
+        """(key, title, tolerance, unit) of what is judged after the fit."""
+        limits = (POSITION_MM, ORIENTATION_DEG)
+        if self.si:
+            limits = (units.metres(POSITION_MM), units.rad(ORIENTATION_DEG))
+        return (
+            ("position", "Positions after the best fit of base and tool", limits[0], self.length),
+            ("orientation", "Orientations after the best fit", limits[1], self.angle),
+        )
+
+
+def check(data: RobotData, q: Array, poses: Array, *, si: bool = False) -> PoseReport:
     """Judge recorded pairs.
 
     Args:
         data: the robot.
         q: joint angles (n, 6), rad.
         poses: recorded poses (n, 4, 4), m, of any tool in any base.
+        si: whether results are told in m and rad, else in mm and degrees.
 
     Raises:
         InputError: too few pairs, or pairs from which base and tool cannot be told apart.
@@ -58,31 +88,27 @@ def check(data: RobotData, q: Array, poses: Array) -> PoseReport:
     base, tool = _fit(made, poses, _closed_form(made, poses), robust=True)
     for _ in range(5):
         gaps = pose_gap(base @ made @ tool, poses)
-        again = ~(_far(gaps[0], POSITION_MM * 1e-3) | _far(gaps[1], np.radians(ORIENTATION_DEG)))
+        again = ~(_far(gaps[0], units.metres(POSITION_MM)) | _far(gaps[1], _LEAST_ANGLE))
         if again.sum() < _LEAST or (again == keep).all():
             break
         keep = again
         base, tool = _fit(made[keep], poses[keep], (base, tool), robust=False)
     position, angle = pose_gap(base @ made @ tool, poses)
+    shown = _Shown("m", "rad") if si else _Shown("mm", "deg")
     rows = [
         {
             "row": i + 1,
-            "position_mm": float(1e3 * position[i]),
-            "orientation_deg": float(np.degrees(angle[i])),
-            "recorded_position_mm": float(1e3 * as_recorded[0][i]),
-            "recorded_orientation_deg": float(np.degrees(as_recorded[1][i])),
+            **shown.gaps("", position[i], angle[i]),
+            **shown.gaps("recorded_", as_recorded[0][i], as_recorded[1][i]),
             "outlier": not bool(keep[i]),
         }
         for i in range(len(q))
     ]
     return PoseReport(
-        results=_judged(q, rows),
-        base=kuka.pose_from_matrix(base.tolist()),
-        tool=kuka.pose_from_matrix(tool.tolist()),
-        recorded={
-            "position_mm": float(1e3 * as_recorded[0].max()),
-            "orientation_deg": float(np.degrees(as_recorded[1].max())),
-        },
+        results=_judged(q, rows, shown),
+        base=kuka.pose_from_matrix(base.tolist(), si=si),
+        tool=kuka.pose_from_matrix(tool.tolist(), si=si),
+        recorded=shown.gaps("", as_recorded[0].max(), as_recorded[1].max()),
         rows=rows,
     )
 
@@ -156,18 +182,15 @@ def _fit(
     return frames(solved.x)
 
 
-def _judged(q: Array, rows: Sequence[dict[str, Any]]) -> list[Result]:
+def _judged(q: Array, rows: Sequence[dict[str, Any]], shown: _Shown) -> list[Result]:
     kept = [row for row in rows if not row["outlier"]]
     outliers = [row["row"] for row in rows if row["outlier"]]
-    shown = ", ".join(map(str, outliers)) or "none"
+    named = ", ".join(map(str, outliers)) or "none"
     found = [("outliers", "No row stands out", float(len(outliers)), 0.5, "rows",
               "five robust standard deviations, and beyond the tolerances below",
-              f"rows that stand out: {shown}", {"rows": outliers})]  # fmt: skip
+              f"rows that stand out: {named}", {"rows": outliers})]  # fmt: skip
     why = "about the absolute accuracy of such an arm; ours, as no figure is published"
-    for key, title, limit, unit in (
-        ("position", "Positions after the best fit of base and tool", POSITION_MM, "mm"),
-        ("orientation", "Orientations after the best fit", ORIENTATION_DEG, "deg"),
-    ):
+    for key, title, limit, unit in shown.limits():
         values = [row[f"{key}_{unit}"] for row in kept]
         worst = kept[int(np.argmax(values))]
         angles = [units.deg(v) for v in q[worst["row"] - 1].tolist()]

@@ -54,7 +54,8 @@ class Case:
     """One property: what holds, where it was sampled, how well it must hold and why.
 
     `method` says what was computed against what; `equations` the chapter's numbers it bears on;
-    `functions` the dotted names it exercises (for the traceability table).
+    `functions` the dotted names it exercises (for the traceability table); `engine` names
+    somebody else's engine that it needs.
     """
 
     id: str
@@ -70,6 +71,7 @@ class Case:
     run: Callable[[Setting], Finding]
     equations: tuple[str, ...] = ()
     functions: tuple[str, ...] = ()
+    engine: str | None = None
 
 
 @dataclass(frozen=True)

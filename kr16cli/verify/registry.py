@@ -40,6 +40,7 @@ def case(
     reason: str,
     equations: Sequence[str] = (),
     functions: Sequence[str] = (),
+    engine: str | None = None,
 ) -> Callable[[Callable[[Setting], Finding]], Callable[[Setting], Finding]]:
     """Register a function as a case of the suite whose module or package it stands in."""
 
@@ -49,7 +50,7 @@ def case(
             raise ValueError(f"case {id} is registered twice")
         _CASES[id] = Case(
             id, suite, title, statement, regime, method, grade, tolerance, unit, reason, run,
-            tuple(equations), tuple(functions),
+            tuple(equations), tuple(functions), engine,
         )  # fmt: skip
         return run
 
@@ -84,14 +85,22 @@ def model_source() -> Iterator[None]:
     What is verified is the source that reads like the chapter; the compiled kernels are
     compared with it by cases of their own. KR16_ENGINE, where set, is left as it is.
     """
-    if os.environ.get("KR16_ENGINE"):
+    with using_engine(os.environ.get("KR16_ENGINE") or "numpy"):
         yield
-        return
-    os.environ["KR16_ENGINE"] = "numpy"
+
+
+@contextmanager
+def using_engine(name: str) -> Iterator[None]:
+    """Robots made inside run on this engine."""
+    before = os.environ.get("KR16_ENGINE")
+    os.environ["KR16_ENGINE"] = name
     try:
         yield
     finally:
-        del os.environ["KR16_ENGINE"]
+        if before is None:
+            del os.environ["KR16_ENGINE"]
+        else:
+            os.environ["KR16_ENGINE"] = before
 
 
 def _run_one(c: Case, setting: Setting) -> Result:

@@ -2,8 +2,8 @@
 
 Each mutant runs in a fresh process under the NumPy engine. The cases that call the changed
 function are run, quick ones first, until one fails. Which cases those are is measured on the
-model as it is, where all of them must pass. Other people's engines are left out: the suites
-must see a fault without them.
+model as it is, where all of them must pass. Cases that need other people's engines are left
+out: the suites must see a fault without them.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-/* The kernels over a tile of 64 configurations, once per instruction set. */
+/* The kernels over a tile of configurations, once per instruction set. */
 #include "kr16_tile.h"
 
 #define TILE KR16_LANES
@@ -6,12 +6,17 @@
 #define OMP_SIMD _Pragma("omp simd")
 #define CLONES KR16_CLONES_OF
 
-CLONES void kr16_sincos_rows(const double *angles, double *rows, int count)
+/* `count` rows of cosines, then of sines; not 0 if an angle is beyond the range of
+ * kr16_sincos, or no number: then they are void. */
+CLONES int kr16_sincos_rows(const double *angles, double *rows, int count)
 {
-    /* rows: `count` rows of cosines, then `count` rows of sines */
-    OMP_SIMD
-    for (int i = 0; i < count * TILE; i++)
+    double beyond = 0.0;
+    _Pragma("omp simd reduction(+ : beyond)")
+    for (int i = 0; i < count * TILE; i++) {
+        beyond += fabs(angles[i]) <= KR16_TRIG_LIMIT ? 0.0 : 1.0;
         kr16_sincos(angles[i], &rows[count * TILE + i], &rows[i]);
+    }
+    return beyond != 0.0;
 }
 
 #include "kr16_kernels.inc"

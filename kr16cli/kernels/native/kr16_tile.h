@@ -1,6 +1,6 @@
 /* What the generated kernels stand on: a tile of configurations, structure of arrays.
  *
- * The generated file is included twice: TILE 64 for batches (vectorised), TILE 1 for one call.
+ * The generated file is included twice: TILE 40 for batches (vectorised), TILE 1 for one call.
  */
 #ifndef KR16_TILE_H
 #define KR16_TILE_H
@@ -26,7 +26,8 @@ typedef struct {
     int operations; /* arithmetic operations per configuration */
 } kr16_kernel;
 
-#define KR16_LANES 64
+/* 40 lanes: rows are 5 cache lines apart, which spreads them over the sets of a cache. */
+#define KR16_LANES 40
 
 /* One version of a function per instruction set, chosen when the library is loaded. */
 #ifdef KR16_CLONES

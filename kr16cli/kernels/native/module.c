@@ -12,6 +12,8 @@
 #include <numpy/arrayobject.h>
 
 #include "batch.h"
+#include "machine.h"
+#include "module.h"
 
 #define MAX_RANK 3
 #define GIL_THRESHOLD 64 /* smaller batches are over before another thread could run */
@@ -23,6 +25,7 @@ typedef struct {
     int groups;
     int rank[3]; /* trailing axes of each input */
     npy_intp count[3];
+    int trig[3]; /* angles: None stands for zeros, but for the first input */
     int out_rank;
     npy_intp out_shape[MAX_RANK];
     double *parameters;
@@ -52,7 +55,7 @@ static int same_lead(PyArrayObject *a, int a_rank, PyArrayObject *b, int b_rank)
            memcmp(PyArray_DIMS(a), PyArray_DIMS(b), (size_t)lead * sizeof(npy_intp)) == 0;
 }
 
-static PyObject *kernel_call(PyObject *self, PyObject *const *args, size_t flags, PyObject *names)
+PyObject *kr16_kernel_call(PyObject *self, PyObject *const *args, size_t flags, PyObject *names)
 {
     Kernel *k = (Kernel *)self;
     const Py_ssize_t given = PyVectorcall_NARGS(flags);
@@ -63,7 +66,7 @@ static PyObject *kernel_call(PyObject *self, PyObject *const *args, size_t flags
     const double *inputs[3];
     PyArrayObject *first = NULL, *array;
     for (int g = 0; g < k->groups; g++) {
-        if (args[g] == Py_None) {
+        if (args[g] == Py_None && g > 0 && k->trig[g]) {
             inputs[g] = NULL;
             continue;
         }
@@ -102,8 +105,9 @@ static PyObject *kernel_call(PyObject *self, PyObject *const *args, size_t flags
             PyArray_NDIM(o) != lead + k->out_rank ||
             memcmp(PyArray_DIMS(o), shape, (size_t)(lead + k->out_rank) * sizeof(npy_intp)) != 0)
             Py_RETURN_NONE;
+        const double *start = PyArray_DATA(o), *end = start + PyArray_SIZE(o);
         for (int g = 0; g < k->groups; g++)
-            if (args[g] != Py_None && args[g] == out)
+            if (inputs[g] != NULL && inputs[g] < end && start < inputs[g] + n * k->count[g])
                 Py_RETURN_NONE;
         Py_INCREF(out);
     }
@@ -123,6 +127,11 @@ static PyObject *kernel_call(PyObject *self, PyObject *const *args, size_t flags
         Py_RETURN_NONE;
     }
     return out;
+}
+
+int kr16_kernel_groups(PyObject *kernel)
+{
+    return ((Kernel *)kernel)->groups;
 }
 
 static int find_kernel(const char *name)
@@ -161,11 +170,12 @@ static PyObject *kernel_new(PyTypeObject *type, PyObject *args, PyObject *kwargs
         goto failed;
     }
     const kr16_kernel *k = &kr16_batch_kernels[index];
-    self->call = kernel_call;
+    self->call = kr16_kernel_call;
     self->kernel = index;
     self->groups = k->groups;
     for (int g = 0; g < k->groups; g++) {
         self->count[g] = k->group[g].count;
+        self->trig[g] = k->group[g].kind == 't';
         self->rank[g] = k->group[g].count == 16 ? 2 : 1;
     }
     self->out_rank = (int)rank;
@@ -209,7 +219,7 @@ static PyMemberDef kernel_members[] = {
     {NULL, 0, 0, 0, NULL},
 };
 
-static PyTypeObject KernelType = {
+PyTypeObject KernelType = {
     PyVarObject_HEAD_INIT(NULL, 0).tp_name = "kr16cli.kernels._native.Kernel",
     .tp_doc = "Kernel(name, parameters, shape): call with inputs, out or None, threads.",
     .tp_basicsize = sizeof(Kernel),
@@ -276,11 +286,44 @@ static PyObject *native_operations(PyObject *self, PyObject *unused)
     return table;
 }
 
+static PyObject *native_multiply_adds(PyObject *self, PyObject *rounds)
+{
+    (void)self;
+    const long n = PyLong_AsLong(rounds);
+    if (n == -1 && PyErr_Occurred())
+        return NULL;
+    return Py_BuildValue("dd", kr16_multiply_adds_flops(n), kr16_multiply_adds(n));
+}
+
+static PyObject *native_touch(PyObject *self, PyObject *const *args, Py_ssize_t count)
+{
+    (void)self;
+    if (count != 2 || !PyArray_CheckExact(args[0]) ||
+        PyArray_TYPE((PyArrayObject *)args[0]) != NPY_DOUBLE ||
+        !PyArray_ISCARRAY((PyArrayObject *)args[0])) {
+        PyErr_SetString(PyExc_TypeError, "touch(array of float64, write)");
+        return NULL;
+    }
+    const int write = PyObject_IsTrue(args[1]);
+    if (write < 0)
+        return NULL;
+    double *numbers = PyArray_DATA((PyArrayObject *)args[0]);
+    const npy_intp n = PyArray_SIZE((PyArrayObject *)args[0]);
+    if (!write)
+        return PyFloat_FromDouble(kr16_read(numbers, n));
+    kr16_write(numbers, n);
+    Py_RETURN_NONE;
+}
+
 static PyMethodDef methods[] = {
     {"sincos", (PyCFunction)(void (*)(void))native_sincos, METH_FASTCALL,
      "sincos(x, sine, cosine): fill two arrays; |x| <= 1e5."},
     {"atan2", (PyCFunction)(void (*)(void))native_atan2, METH_FASTCALL,
      "atan2(y, x, angle): fill the third array."},
+    {"multiply_adds", native_multiply_adds, METH_O,
+     "multiply_adds(rounds): (floating-point operations done, their result)."},
+    {"touch", (PyCFunction)(void (*)(void))native_touch, METH_FASTCALL,
+     "touch(array, write): read every number, or fill the array past the caches."},
     {"operations", native_operations, METH_NOARGS,
      "Arithmetic operations per configuration, by kernel."},
     {NULL, NULL, 0, NULL},
@@ -315,7 +358,8 @@ PyMODINIT_FUNC PyInit__native(void)
     if (PyType_Ready(&KernelType) < 0)
         return NULL;
     PyObject *m = PyModule_Create(&module);
-    if (m != NULL && PyModule_AddObjectRef(m, "Kernel", (PyObject *)&KernelType) < 0)
+    if (m != NULL && (PyModule_AddObjectRef(m, "Kernel", (PyObject *)&KernelType) < 0 ||
+                      kr16_add_method_type(m) < 0 || kr16_add_rollout(m) < 0))
         Py_CLEAR(m);
     return m;
 }

@@ -6,14 +6,16 @@ chapter's base b; lengths in m, angles as (cos, sin) pairs.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, lru_cache
 from itertools import combinations
-from typing import NamedTuple
+from typing import NamedTuple, ParamSpec, TypeVar
 
 from kr16cli.verify.chapter.language import angle, evaluate
 from kr16cli.verify.chapter.scalars import Dual, Functions, Pair, Scalar
 
+_Arguments = ParamSpec("_Arguments")
+_Answer = TypeVar("_Answer")
 Vector = list[Scalar]
 Matrix = list[list[Scalar]]
 
@@ -38,6 +40,14 @@ TABLE_3_1 = (
 )
 
 
+_MANY = 512
+
+
+def once(f: Callable[_Arguments, _Answer]) -> Callable[_Arguments, _Answer]:
+    """Keep what a function finds of a point: many statements ask for the same."""
+    return lru_cache(_MANY)(f)  # type: ignore[return-value]  # lru_cache loses the arguments
+
+
 def _no(x: Scalar) -> bool:
     return x.__class__ is int and not x
 
@@ -51,15 +61,8 @@ def total(terms: Sequence[Scalar]) -> Scalar:
 
 
 def product(a: Matrix, b: Matrix) -> Matrix:
-    """Matrix product; structural zeros (the integer 0) cost nothing."""
-    columns = list(zip(*b, strict=True))
-    return [
-        [
-            total([x * y for x, y in zip(row, column, strict=True) if not (_no(x) or _no(y))])
-            for column in columns
-        ]
-        for row in a
-    ]
+    """Matrix product; structural zeros and ones (the integers 0 and 1) cost nothing."""
+    return [[dot(row, column) for column in zip(*b, strict=True)] for row in a]
 
 
 def apply(a: Matrix, v: Sequence[Scalar]) -> Vector:
@@ -93,8 +96,23 @@ def times(k: Scalar, a: Sequence[Scalar]) -> Vector:
 
 
 def dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
-    """a . b."""
-    return total([x * y for x, y in zip(a, b, strict=True) if not (_no(x) or _no(y))])
+    """a . b; structural zeros and ones cost nothing."""
+    result: Scalar = 0
+    started = False
+    for x, y in zip(a, b, strict=True):
+        if x.__class__ is int:
+            if not x:
+                continue
+            term = y if x == 1 else x * y
+        elif y.__class__ is int:
+            if not y:
+                continue
+            term = x if y == 1 else x * y
+        else:
+            term = x * y
+        result = result + term if started else term
+        started = True
+    return result
 
 
 def cross(a: Sequence[Scalar], b: Sequence[Scalar]) -> Vector:
@@ -116,15 +134,20 @@ def origin(t: Matrix) -> Vector:
     return [row[3] for row in t[:3]]
 
 
-def step(row: Row, p: Point) -> Matrix:
-    """The right side of (3.1) for one row: Rot_z,q Trans_z,d Trans_x,a Rot_x,alpha."""
-    (c, s), (ca, sa) = angle(row.q, p), angle(row.alpha, p)
+def turn(row: Row, p: Point) -> Matrix:
+    """Rot_z,q of (3.1)."""
+    c, s = angle(row.q, p)
+    return [[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+
+
+def link(row: Row, p: Point) -> Matrix:
+    """Trans_z,d Trans_x,a Rot_x,alpha of (3.1): what does not move."""
+    ca, sa = angle(row.alpha, p)
     d, a = evaluate(row.d, p), evaluate(row.a, p)
-    rot_z = [[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
     trans_z = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, d], [0, 0, 0, 1]]
     trans_x = [[1, 0, 0, a], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
     rot_x = [[1, 0, 0, 0], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]]
-    return product(product(rot_z, trans_z), product(trans_x, rot_x))
+    return product(product(trans_z, trans_x), rot_x)
 
 
 class Point:
@@ -139,15 +162,35 @@ class Point:
         angles: Mapping[str, Pair],
         values: Mapping[str, Scalar],
         functions: Functions | None = None,
+        near: Point | None = None,
     ) -> None:
+        """`near` is a point with the same values, whose joints may be the same in part."""
         self.angles, self.values, self.functions = angles, values, functions
+        self._near = near
+
+    @cached_property
+    def links(self) -> list[Matrix]:
+        """What does not move in the rows of Table 3.1."""
+        return self._near.links if self._near else [link(row, self) for row in TABLE_3_1]
+
+    @cached_property
+    def steps(self) -> list[Matrix]:
+        """T_i^(i+1) of (3.1) for each row of Table 3.1; of joints that stand as in `near`, its."""
+        near = self._near
+        return [
+            near.steps[k]
+            if near and (k == 0 or self.angles[f"q{k}"] is near.angles[f"q{k}"])
+            else product(turn(row, self), self.links[k])
+            for k, row in enumerate(TABLE_3_1)
+        ]
 
     @cached_property
     def frames(self) -> list[Matrix]:
         """T of frames 0 to 6 in b, by multiplying the rows of Table 3.1 in order."""
-        result = [step(TABLE_3_1[0], self)]
-        for row in TABLE_3_1[1:]:
-            result.append(product(result[-1], step(row, self)))
+        near, result = self._near, self.steps[:1]
+        for k, own in enumerate(self.steps[1:], 1):
+            same = near and own is near.steps[k] and result[-1] is near.frames[k - 1]
+            result.append(near.frames[k] if near and same else product(result[-1], own))
         return result
 
     def R(self, k: int) -> Matrix:
@@ -181,8 +224,9 @@ class Point:
         turned = dict(self.angles)
         for i, rate in enumerate(rates, 1):
             c, s = self.angles[f"q{i}"]
-            turned[f"q{i}"] = (Dual(c, -(s * rate)), Dual(s, c * rate))
-        return Point(turned, self.values)
+            if not _no(rate):
+                turned[f"q{i}"] = (Dual(c, -(s * rate)), Dual(s, c * rate))
+        return Point(turned, self.values, near=self)
 
     @cached_property
     def along(self) -> Point:
@@ -201,7 +245,7 @@ class Point:
 
     def at(self, **angles: Pair) -> Point:
         """The same numbers at other angles."""
-        return Point({**self.angles, **angles}, self.values, self.functions)
+        return Point({**self.angles, **angles}, self.values, self.functions, near=self)
 
 
 def rate(x: Scalar) -> Scalar:

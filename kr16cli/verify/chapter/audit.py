@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from kr16cli.verify.chapter import (
+    model_side,
     printed_dynamics,
     printed_forward,
     printed_inverse,
@@ -15,7 +16,7 @@ from kr16cli.verify.chapter import (
     printed_velocity,
     printed_wrist,
 )
-from kr16cli.verify.chapter.bench import Bench
+from kr16cli.verify.chapter.bench import shared_bench
 from kr16cli.verify.chapter.judge import judge
 from kr16cli.verify.chapter.records import Equation, Statement
 from kr16cli.verify.records import Setting
@@ -38,13 +39,13 @@ def audit(setting: Setting) -> list[Equation]:
     The arm of the audit is `data/chapter3.toml` (and random rational arms), whatever robot is
     set; `setting` gives the seed and whether to draw fewer points.
     """
-    bench = Bench(setting.seed, setting.quick)
-    return [judge(name, s, bench) for name, section in SECTIONS.items() for s in section]
+    return [e for name in SECTIONS for e in audit_section(name, setting)]
 
 
 def audit_section(name: str, setting: Setting) -> list[Equation]:
     """The statements of one of `SECTIONS`."""
-    bench = Bench(setting.seed, setting.quick)
+    model_side.forget()
+    bench = shared_bench(setting.seed, setting.quick)
     return [judge(name, s, bench) for s in SECTIONS[name]]
 
 

@@ -7,7 +7,7 @@ import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 from kr16cli.robot import RobotData
 from kr16cli.robot_file import load_data
@@ -103,7 +103,7 @@ class Bench:
     @cached_property
     def floats(self) -> list[Point]:
         """Configurations of the chapter's arm in float64."""
-        return self.configurations(FLOATS, 8 if self.quick else 24, self.seed + 2)
+        return self.configurations(FLOATS, 4 if self.quick else 24, self.seed + 2)
 
     def configurations(self, f: Functions, count: int, seed: int) -> list[Point]:
         """Random angles (theta within +-90 deg) and rates of the chapter's arm.
@@ -141,6 +141,12 @@ class Bench:
         angle = {name: f.number(v) for name, v in full.items()}
         values |= {f"{name}_true": v for name, v in angle.items()}
         return Point({name: f.pair(v) for name, v in angle.items()}, values, f)
+
+
+@lru_cache(2)
+def shared_bench(seed: int, quick: bool) -> Bench:
+    """The bench of all sections with these choices: what is known of its points is kept."""
+    return Bench(seed, quick)
 
 
 def _sign(x: float) -> int:

@@ -174,7 +174,7 @@ def _all_found(bench: Bench) -> Found:
     counts: dict[int, int] = {}
     failures: list[str] = []
     gap = 0.0
-    centres = _random_centres(bench, len(bench.floats) * (2 if bench.quick else 3))
+    centres = _random_centres(bench, len(bench.floats) * (4 if bench.quick else 3))
     for i, centre in enumerate(centres):
         p = bench.floats[i % len(bench.floats)]
         pose = [[*p.R(6)[k], c + p.values["d6"] * p.z(6)[k]] for k, c in enumerate(centre)]

@@ -76,10 +76,10 @@ def _compared(s: Statement, truth: Values, bench: Bench) -> Found:
     forms = [f for f in (accepted, s.model) if f]
     how = _exactly(forms, truth, bench) if s.exact else _precisely(len(points), bench)
 
-    floats = bench.floats
-    residual = max((spread(f(p), truth(p)) for f in forms for p in floats), default=0.0)
+    floats = [(p, truth(p)) for p in bench.floats]
+    residual = max((spread(f(p), t) for f in forms for p, t in floats), default=0.0)
     wrong = [f for f in (s.printed if s.corrected else None, *s.otherwise) if f]
-    errors = [max(spread(f(p), truth(p)) for p in floats) for f in wrong]
+    errors = [max(spread(f(p), t) for p, t in floats) for f in wrong]
     if any(error < SEEN for error in errors):
         failures.append("a wrong reading is not seen in float64")
     return Found(

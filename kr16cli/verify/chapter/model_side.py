@@ -6,7 +6,9 @@ The only part of the audit that imports `kr16cli.model`.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import ParamSpec, TypeVar
 
 from kr16cli.model import (
     chain,
@@ -35,6 +37,24 @@ Links = tuple[Body, ...]
 """The six moving links."""
 
 _NOBODY = Provenance("estimated", ())
+_MANY = 256
+
+_Arguments = ParamSpec("_Arguments")
+_Answer = TypeVar("_Answer")
+_FORGET: list[Callable[[], None]] = []
+
+
+def remembered(f: Callable[_Arguments, _Answer]) -> Callable[_Arguments, _Answer]:
+    """Keep what the model answers until `forget`: many statements ask the same of a point."""
+    kept = lru_cache(_MANY)(f)
+    _FORGET.append(kept.cache_clear)
+    return kept  # type: ignore[return-value]  # lru_cache loses the arguments
+
+
+def forget() -> None:
+    """Ask the model anew: it may have been changed since."""
+    for clear in _FORGET:
+        clear()
 
 
 def plain(v: Scalar) -> Scalar:
@@ -67,12 +87,14 @@ def in_robroot(v: Sequence[Scalar]) -> tuple[Scalar, Scalar, Scalar]:
     return v[1], -v[0], v[2]
 
 
+@remembered
 def frames(p: Point) -> list[Matrix]:
     """Frames 0 to 6 in b by `chain.frames`."""
     links = chain.frames(joints(p), geometry(p), chain.CHAPTER_BASE)
     return [[[plain(x) for x in row] for row in frame.rows()[:3]] for frame in links]
 
 
+@remembered
 def closed_form(p: Point) -> Matrix:
     """Frame 6 in b (3x4) by `forward.flange`: its x and y are the flange's reversed."""
     f = forward.flange(joints(p), geometry(p))
@@ -85,11 +107,13 @@ def pose(p: Point) -> list[Matrix]:
     return [frames(p)[6], closed_form(p)]
 
 
+@remembered
 def r36(p: Point) -> Matrix:
     """R of (3.22)."""
     return forward.r36(joints(p))
 
 
+@remembered
 def wrist(p: Point) -> Vector:
     """Wrist centre by the closed form and by (3.8) from the flange's pose."""
     a = forward.arm(joints(p), geometry(p))
@@ -191,6 +215,7 @@ def rpy_rotation(p: Point) -> Matrix:
     return orientation.rotation_from_rpy(rpy(p))
 
 
+@remembered
 def rate_matrix(p: Point) -> Matrix:
     """B of (3.46)."""
     return [[plain(v) for v in row] for row in orientation.rate_matrix(rpy(p))]

@@ -7,7 +7,6 @@ M, its derivatives and C from them. Independent of `kr16cli.model`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 from kr16cli.verify.chapter.arm import (
     Matrix,
@@ -17,6 +16,7 @@ from kr16cli.verify.chapter.arm import (
     cross,
     dot,
     minus,
+    once,
     plus,
     product,
     rate,
@@ -39,10 +39,8 @@ IN_LINK = (
 )
 """The mass centres of (3.29) in frames 1 to 6: constants, as the parameter file has them."""
 
-_MANY = 256
 
-
-@lru_cache(_MANY)
+@once
 def centres(p: Point) -> list[Vector]:
     """p_c1..p_c6 in b as printed before (3.29)."""
     r = [p.values[f"r{i}"] for i in range(1, 7)]
@@ -67,13 +65,13 @@ def carried(p: Point, k: int) -> Vector:
     return plus(p.o(k), apply(p.R(k), evaluate(IN_LINK[k - 1], p)))
 
 
-@lru_cache(_MANY)
+@once
 def linear(p: Point, k: int) -> Matrix:
     """J_vk = dp_ck/dq by exact differentiation (3.31), 3x6."""
     return transpose([rates(carried(moving, k)) for moving in p.partials])
 
 
-@lru_cache(_MANY)
+@once
 def angular(p: Point, k: int) -> Matrix:
     """J_wk by differentiation: column i is the spin of frame k along q_i, 3x6."""
     return transpose([spin(moving, p, k) for moving in p.partials])
@@ -106,7 +104,7 @@ def mass_matrix_of(p: Point, parts: Sequence[tuple[Matrix, Matrix]]) -> Matrix:
     return result
 
 
-@lru_cache(_MANY)
+@once
 def mass_matrix(p: Point) -> Matrix:
     """M by (3.38) with the column formulas of the Jacobians."""
     c = centres(p)
@@ -114,13 +112,13 @@ def mass_matrix(p: Point) -> Matrix:
     return mass_matrix_of(p, parts)
 
 
-@lru_cache(_MANY)
+@once
 def mass_derivatives(p: Point) -> list[Matrix]:
     """dM/dq_k, k first, by exact differentiation."""
     return [[[rate(x) for x in row] for row in mass_matrix(moving)] for moving in p.partials]
 
 
-@lru_cache(_MANY)
+@once
 def christoffel(p: Point, *, printed: bool = False) -> list[Matrix]:
     """C_k(i,j) of (3.41), k first; `printed` has dM(k,i)/dq_k for dM(i,j)/dq_k."""
     d = mass_derivatives(p)

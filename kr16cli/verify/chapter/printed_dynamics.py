@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
 
 from kr16cli.verify.chapter import model_side, motion
-from kr16cli.verify.chapter.arm import Matrix, Point, apply, dot, flat, rate, rates, total
+from kr16cli.verify.chapter.arm import Matrix, Point, apply, dot, flat, once, rate, rates, total
 from kr16cli.verify.chapter.records import Statement, Values, definition, element
 from kr16cli.verify.chapter.scalars import Scalar
 
@@ -31,12 +30,12 @@ SHORT = {
 CHRISTOFFEL = "C_k(i,j) = {dM(k,j)/dq_i + dM(k,i)/dq_j - dM(%s)/dq_k}/2"
 
 
-@lru_cache(128)
+@model_side.remembered
 def _bodies(p: Point) -> model_side.Links:
     return model_side.bodies(p, motion.in_links(p))
 
 
-@lru_cache(128)
+@once
 def _true_mass(p: Point) -> Matrix:
     """M by (3.38) with Jacobians by differentiation."""
     return motion.mass_matrix_of(
@@ -44,17 +43,17 @@ def _true_mass(p: Point) -> Matrix:
     )
 
 
-@lru_cache(128)
+@once
 def _true_coriolis(p: Point) -> Matrix:
     return motion.coriolis(p, motion.christoffel(p))
 
 
-@lru_cache(128)
+@model_side.remembered
 def _model_mass(p: Point) -> Sequence[Scalar]:
     return model_side.mass_matrix(p, _bodies(p))
 
 
-@lru_cache(128)
+@model_side.remembered
 def _model_coriolis(p: Point) -> Sequence[Scalar]:
     return model_side.coriolis_matrix(p, _bodies(p))
 

@@ -14,9 +14,9 @@ from kr16cli.verify.chapter.arm import (
     dot,
     flat,
     minus,
+    once,
     product,
     rotation,
-    step,
     total,
     transpose,
 )
@@ -56,6 +56,7 @@ COLUMNS: dict[str, tuple[str, list[str | None]]] = {
 CORRECTIONS = {("3.4", 3): "c23*c6*s4 - s6*(s23*s5 - c23*c4*c5)"}
 
 
+@once
 def closed_form(p: Point) -> Matrix:
     """T by its printed columns, corrected and completed, 4x4."""
     columns = [
@@ -121,7 +122,7 @@ def _rows(choose: Callable[[Point], Sequence[Matrix]]) -> Values:
 
 
 def _all_rows(p: Point) -> list[Matrix]:
-    return [step(row, p) for row in TABLE_3_1]
+    return p.steps
 
 
 def _inverse(t: Matrix) -> Matrix:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 from kr16cli.verify.chapter import model_side
-from kr16cli.verify.chapter.arm import Point, determinant, flat, rates, spin, transpose
+from kr16cli.verify.chapter.arm import Point, determinant, flat, once, rates, spin, transpose
 from kr16cli.verify.chapter.language import sum_of_angles
 from kr16cli.verify.chapter.printed_wrist import HALF_TURN
 from kr16cli.verify.chapter.records import Statement, Values, element, formula
@@ -18,7 +17,7 @@ DETERMINANT = "a2*s5*(a3*c3 + d4*s3)*(a1 + d4*c23 - a3*s23 + a2*c2)"
 SHOULDER = "(a1 + d4*c23 - a3*s23 + a2*c2)"
 
 
-@lru_cache(128)
+@once
 def _elbow_point(p: Point) -> Point:
     """The configuration with a3, d4 such that a3 c3 + d4 s3 = 0: arm stretched or folded."""
     c3, s3 = p.angles["q3"]
@@ -26,7 +25,7 @@ def _elbow_point(p: Point) -> Point:
     return Point(p.angles, {**p.values, "a3": -s3 * length, "d4": c3 * length}, p.functions)
 
 
-@lru_cache(128)
+@once
 def _true_determinant(p: Point) -> Sequence[Scalar]:
     columns = [[*rates(moving.o(6)), *spin(moving, p, 6)] for moving in p.partials]
     return [determinant(transpose(columns))]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
 
 from kr16cli.verify.chapter import model_side, motion
 from kr16cli.verify.chapter.arm import (
@@ -15,6 +14,7 @@ from kr16cli.verify.chapter.arm import (
     dot,
     flat,
     minus,
+    once,
     plus,
     product,
     rates,
@@ -74,7 +74,7 @@ def _model_angle(name: str) -> Values:
     return run
 
 
-@lru_cache(128)
+@once
 def _turning(p: Point) -> Matrix:
     """B by differentiation: column j is the axial vector of R' R^T for a unit rate of angle j."""
     columns = []

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 
 from kr16cli.verify.chapter import model_side, motion
 from kr16cli.verify.chapter.arm import (
-    TABLE_3_1,
     Matrix,
     Point,
     Vector,
@@ -18,7 +17,6 @@ from kr16cli.verify.chapter.arm import (
     rates,
     rotation,
     spin,
-    step,
     transpose,
 )
 from kr16cli.verify.chapter.records import Statement, Values, definition, element, formula
@@ -45,6 +43,11 @@ J2 = (
 """(3.36)."""
 
 
+@model_side.remembered
+def _model_centres(p: Point) -> list[Vector]:
+    return model_side.mass_centres(p, model_side.bodies(p, motion.in_links(p)))
+
+
 def _centre(k: int) -> Statement:
     return Statement(
         f"p_c{k}",
@@ -53,7 +56,7 @@ def _centre(k: int) -> Statement:
         "holds",
         printed=lambda p: motion.centres(p)[k - 1],
         truth=lambda p: motion.carried(p, k),
-        model=lambda p: model_side.mass_centres(p, model_side.bodies(p, motion.in_links(p)))[k - 1],
+        model=lambda p: _model_centres(p)[k - 1],
         note=f"Fixed to link {k}, at {motion.IN_LINK[k - 1]} of its frame, on the line between "
         "two joints" + "; here o_1 is on the A2 axis" * (k == 2),
         unit="m",
@@ -62,12 +65,12 @@ def _centre(k: int) -> Statement:
 
 def _axes(p: Point, *, reversed_notation: bool = False) -> Sequence[Scalar]:
     """R_1^b..R_6^b by the product of (3.29)."""
-    result = rotation(step(TABLE_3_1[0], p))
+    result = rotation(p.steps[0])
     if reversed_notation:
         result = transpose(result)
     found = []
-    for row in TABLE_3_1[1:]:
-        factor = rotation(step(row, p))
+    for step in p.steps[1:]:
+        factor = rotation(step)
         result = product(result, transpose(factor) if reversed_notation else factor)
         found += flat(result)
     return found
@@ -89,8 +92,7 @@ def _by_jacobian(p: Point) -> Sequence[Scalar]:
 
 
 def _by_model(p: Point) -> Sequence[Scalar]:
-    c = motion.centres(p)
-    rows = [model_side.jacobian_of(p, c[k - 1], k)[:3] for k in range(1, 7)]
+    rows = [_model_jacobian(p, k)[:3] for k in range(1, 7)]
     return [v for j in rows for v in apply(j, p.rates)]
 
 
@@ -119,8 +121,14 @@ def _running_axis(p: Point) -> Matrix:
     return motion.linear_columns(p, motion.centres(p)[5], 6)
 
 
+@model_side.remembered
+def _model_jacobian(p: Point, k: int) -> Matrix:
+    """The model's Jacobian (6x6) of mass centre k."""
+    return model_side.jacobian_of(p, motion.centres(p)[k - 1], k)
+
+
 def _model_linear(p: Point) -> Matrix:
-    return model_side.jacobian_of(p, motion.centres(p)[5], 6)[:3]
+    return _model_jacobian(p, 6)[:3]
 
 
 def _all_angular(p: Point, last: int | None) -> Matrix:
@@ -139,8 +147,7 @@ def _true_angular(p: Point) -> Matrix:
 
 
 def _model_angular(p: Point) -> Matrix:
-    c = motion.centres(p)
-    return [row for k in range(1, 7) for row in model_side.jacobian_of(p, c[k - 1], k)[3:]]
+    return [row for k in range(1, 7) for row in _model_jacobian(p, k)[3:]]
 
 
 def _jacobian(k: int) -> Callable[[Point], Matrix]:
@@ -300,16 +307,14 @@ STATEMENTS: list[Statement] = [
         truth=lambda p: flat(_jacobian(1)(p)),
         corrected=lambda p: [0] * 30 + [-1] + [0] * 5,
         correction="J_1 = [J_v1; J_omega1] is zero but for element [6,1] = -1",
-        model=lambda p: flat(model_side.jacobian_of(p, motion.centres(p)[0], 1)),
+        model=lambda p: flat(_model_jacobian(p, 1)),
         note="The number is skipped: (3.34) is followed by (3.36)",
     ),
     *[
         element(
             "3.36", (i + 1, j + 1), f"J_2[{i + 1},{j + 1}]", text,
             lambda p, i=i, j=j: [_jacobian(2)(p)[i][j]],  # type: ignore[misc]
-            model=lambda p, i=i, j=j: [  # type: ignore[misc]
-                model_side.jacobian_of(p, motion.centres(p)[1], 2)[i][j]
-            ],
+            model=lambda p, i=i, j=j: [_model_jacobian(p, 2)[i][j]],  # type: ignore[misc]
             unit="m" if i < 3 else "1",
         )
         for i, row in enumerate(J2) for j, text in enumerate(row)

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from operator import add
 from typing import Any
 
 Scalar = Any
@@ -85,8 +86,7 @@ class Degree:
     def __mul__(self, other: Scalar) -> Degree:
         if not isinstance(other, Degree):
             return self
-        turns = tuple(a + b for a, b in zip(self.turns, other.turns, strict=True))
-        return Degree(turns, self.rest + other.rest)
+        return Degree(tuple(map(add, self.turns, other.turns)), self.rest + other.rest)
 
     __rmul__ = __mul__
 

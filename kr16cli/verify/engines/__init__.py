@@ -10,6 +10,8 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import NamedTuple, Protocol
 
+import numpy as np
+
 from kr16cli.robot import Payload, RobotData
 from kr16cli.verify.independent.rotations import Array
 from kr16cli.verify.records import SkipCase
@@ -73,3 +75,26 @@ def engine(name: str, data: RobotData, payload: Payload | None, *, quick: bool) 
     module = import_module(f"{__name__}.{source.build}")
     build: Callable[[RobotData, Payload | None], Engine] = module.build
     return build(data, payload)
+
+
+def integrated(
+    accelerate: Callable[..., Array], q: Array, qd: Array, tau: Array, times: Array
+) -> Array:
+    """Joint angles (n, 6) at `times` (s) under constant torques, by SciPy's DOP853 at 1e-9.
+
+    Args:
+        accelerate: accelerations for angles, speeds and torques, (6,) each.
+        q: angles at the start, rad.
+        qd: speeds at the start, rad/s.
+        tau: torques, N m.
+        times: ascending.
+    """
+    from scipy.integrate import solve_ivp
+
+    def rate(_: float, state: Array) -> Array:
+        return np.concatenate([state[6:], accelerate(state[:6], state[6:], tau)])
+
+    start = np.concatenate([q, qd])
+    span = (0.0, float(times[-1]))
+    solved = solve_ivp(rate, span, start, "DOP853", times, rtol=1e-9, atol=1e-10)
+    return np.asarray(solved.y[:6].T)

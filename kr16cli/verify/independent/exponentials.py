@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from kr16cli.robot import Geometry
-from kr16cli.verify.independent.rotations import Array, about_axis
+from kr16cli.verify.independent.rotations import Array, about_axis, cross
 
 AXES = np.array([[0, 0, -1], [0, 1, 0], [0, 1, 0], [-1, 0, 0], [0, 1, 0], [-1, 0, 0]], dtype=float)
 """Joint axes A1 to A6 at the zero pose, robroot; positive turns are KUKA's."""
@@ -36,15 +36,15 @@ def motions(g: Geometry, q: Array) -> list[Array]:
 
     E_i = e^([xi_1] q_1) ... e^([xi_i] q_i) (Brockett 1984).
     """
-    total = np.broadcast_to(np.eye(4, dtype=q.dtype), (*q.shape[:-1], 4, 4))
-    result = [total]
-    for i, (axis, point) in enumerate(zip(AXES, points(g), strict=True)):
-        step = np.zeros((*q.shape[:-1], 4, 4), dtype=q.dtype)
-        rotation = about_axis(axis, q[..., i])
-        step[..., :3, :3] = rotation
-        step[..., :3, 3] = point - rotation @ point
-        step[..., 3, 3] = 1.0
-        total = total @ step
+    rotations, on_axes = about_axis(AXES, q), points(g)
+    steps = np.zeros((*q.shape, 4, 4), dtype=q.dtype)
+    steps[..., :3, :3] = rotations
+    steps[..., :3, 3] = on_axes - (rotations @ on_axes[:, :, None])[..., 0]
+    steps[..., 3, 3] = 1.0
+    total = steps[..., 0, :, :]
+    result = [np.broadcast_to(np.eye(4, dtype=q.dtype), total.shape), total]
+    for i in range(1, 6):
+        total = total @ steps[..., i, :, :]
         result.append(total)
     return result
 
@@ -74,7 +74,7 @@ def jacobian(g: Geometry, q: Array, point: Array, link: int = 6) -> Array:
     table = np.zeros((*q.shape[:-1], 6, 6), dtype=q.dtype)
     for i, (axis, on_axis) in enumerate(zip(AXES[:link], points(g)[:link], strict=True)):
         z = moves[i][..., :3, :3] @ axis
-        table[..., :3, i] = np.cross(z, place - carried(moves[i], on_axis))
+        table[..., :3, i] = cross(z, place - carried(moves[i], on_axis))
         table[..., 3:, i] = z
     return table
 
@@ -119,7 +119,7 @@ def elbow_side(g: Geometry, q: Array) -> Array:
     shoulder, elbow, wrist = (carried(moves[k], points(g)[p]) for k, p in ((1, 1), (2, 2), (3, 3)))
     along, beyond = elbow - shoulder, wrist - elbow
     axis = moves[1][..., :3, :3] @ AXES[1]
-    return np.asarray((np.cross(along, beyond) * axis).sum(axis=-1) / g.a2)
+    return np.asarray((cross(along, beyond) * axis).sum(axis=-1) / g.a2)
 
 
 def forward_of_column(g: Geometry, q: Array) -> Array:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from kr16cli.robot import LinkData, Payload, RobotData
 from kr16cli.verify.independent import exponentials as poe
-from kr16cli.verify.independent.rotations import Array, derivative, gradient, skew
+from kr16cli.verify.independent.rotations import Array, cross, derivative, gradient, skew
 
 
 @dataclass(frozen=True)
@@ -87,16 +88,16 @@ class Lagrangian:
     def _links(self, q: Array) -> list[tuple[Body, Array, Array, Array]]:
         """Per link: its body, Jacobians of its mass centre, and its inertia, in robroot."""
         moves = poe.motions(self.g, q)
-        z = [moves[i][..., :3, :3] @ axis for i, axis in enumerate(poe.AXES)]
-        o = [poe.carried(moves[i], point) for i, point in enumerate(poe.points(self.g))]
+        z = np.stack([m[..., :3, :3] @ a for m, a in zip(moves, poe.AXES, strict=False)], -2)
+        places = zip(moves, poe.points(self.g), strict=False)
+        o = np.stack([poe.carried(m, point) for m, point in places], axis=-2)
         result = []
         for k, body in enumerate(self.bodies, 1):
             rotation, centre = moves[k][..., :3, :3], poe.carried(moves[k], body.centre)
             linear = np.zeros((*q.shape[:-1], 3, 6), dtype=q.dtype)
             angular = np.zeros_like(linear)
-            for i in range(k):
-                linear[..., i] = np.cross(z[i], centre - o[i])
-                angular[..., i] = z[i]
+            linear[..., :k] = _t(cross(z[..., :k, :], centre[..., None, :] - o[..., :k, :]))
+            angular[..., :k] = _t(z[..., :k, :])
             result.append((body, linear, angular, rotation @ body.inertia @ _t(rotation)))
         return result
 
@@ -107,6 +108,14 @@ class Lagrangian:
             v, w = _apply(linear, qd), _apply(angular, qd)
             total = total + (body.mass * (v * v).sum(-1) + (w * _apply(inertia, w)).sum(-1)) / 2
         return total
+
+    def _momentum(self, q: Array, qd: Array) -> Array:
+        """dT/dqd = M qd, (..., 6), summed over links from their velocities."""
+        total: Any = 0.0
+        for body, linear, angular, inertia in self._links(q):
+            push = _apply(_t(linear), body.mass * _apply(linear, qd))
+            total = total + push + _apply(_t(angular), _apply(inertia, _apply(angular, qd)))
+        return np.asarray(total)
 
     def potential(self, q: Array) -> Array:
         """-sum m g . p, J, zero at robroot's origin."""
@@ -133,7 +142,7 @@ class Lagrangian:
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
         """d/dt (dT/dqd) - dT/dq + dP/dq."""
-        momentum_rate = derivative(lambda a, b: _apply(self.mass_matrix(a), b), (q, qd), (qd, qdd))
+        momentum_rate = derivative(self._momentum, (q, qd), (qd, qdd))
         return np.asarray(
             momentum_rate
             - gradient(lambda a: self.kinetic(a, qd[..., None, :]), q)
@@ -151,14 +160,14 @@ class Lagrangian:
             centres = self.mass_centres(a)
             for k, (body, linear, angular, inertia) in enumerate(self._links(a)):
                 p = body.mass * _apply(linear, rate)
-                spin = np.cross(centres[..., k, :], p) + _apply(inertia, _apply(angular, rate))
+                spin = cross(centres[..., k, :], p) + _apply(inertia, _apply(angular, rate))
                 total = total + np.concatenate([p, spin], axis=-1)
             return total
 
         change = derivative(momenta, (q, qd), (qd, qdd))
         masses = np.array([body.mass for body in self.bodies])
         weight = np.broadcast_to(masses.sum() * self.field, (*q.shape[:-1], 3))
-        turning = np.cross(np.einsum("...kx,k->...x", self.mass_centres(q), masses), self.field)
+        turning = cross(np.einsum("...kx,k->...x", self.mass_centres(q), masses), self.field)
         return np.asarray(change - np.concatenate([weight, turning], axis=-1))
 
 

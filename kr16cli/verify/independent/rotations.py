@@ -33,16 +33,24 @@ def gradient(function: Callable[[Array], Array], q: Array) -> Array:
 
 def skew(v: Array) -> Array:
     """[v]x: [v]x w = v x w, for v (..., 3)."""
-    zero = np.zeros_like(v[..., 0])
-    x, y, z = v[..., 0], v[..., 1], v[..., 2]
-    rows = ((zero, -z, y), (z, zero, -x), (-y, x, zero))
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    out = np.zeros((*v.shape, 3), dtype=v.dtype)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        out[..., i, k], out[..., k, i] = v[..., j], -v[..., j]
+    return out
+
+
+def cross(a: Array, b: Array) -> Array:
+    """a x b along the last axis, for (..., 3); several times as quick as NumPy's."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
 def about_axis(axis: Array, angle: Array) -> Array:
-    """Rotation about a unit axis (3,) by angles (...), Rodrigues' formula, (..., 3, 3)."""
+    """Rotations about unit axes (..., 3) by angles (...), Rodrigues' formula, (..., 3, 3)."""
     c, s = np.cos(angle)[..., None, None], np.sin(angle)[..., None, None]
-    return np.asarray(c * np.eye(3) + s * skew(axis) + (1 - c) * np.outer(axis, axis))
+    outer = axis[..., :, None] * axis[..., None, :]
+    return np.asarray(c * np.eye(3) + s * skew(axis) + (1 - c) * outer)
 
 
 def from_abc(abc: Array) -> Array:

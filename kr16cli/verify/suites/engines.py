@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -12,12 +11,12 @@ from kr16cli import Robot
 from kr16cli.kernels.engine import has_native
 from kr16cli.kernels.quantities import QUANTITIES, Quantity
 from kr16cli.verify import sampling
-from kr16cli.verify.engines import SOURCES, Engine, engine
+from kr16cli.verify.engines import SOURCES, Engine, engine, integrated
 from kr16cli.verify.independent import exponentials as poe
 from kr16cli.verify.independent.rotations import Array
 from kr16cli.verify.measure import finding, gap, largest, relative
 from kr16cli.verify.records import Finding, Setting, SkipCase
-from kr16cli.verify.registry import case
+from kr16cli.verify.registry import case, using_engine
 from kr16cli.verify.suites.dynamics.common import Motion
 
 
@@ -126,6 +125,7 @@ def _register(name: str, key: str, quantity: _Comparison) -> None:
         else "rounding of both; the condition of M, up to 1e5, for accelerations",
         equations=quantity.equations,
         functions=(f"kr16cli.Robot.{quantity.function}",),
+        engine=name,
     )
     def compare(setting: Setting) -> Finding:
         rng = sampling.random(setting, key)
@@ -156,15 +156,8 @@ def _compiled(robot: Robot) -> Robot:
     """The same robot on the compiled kernels."""
     if not has_native():
         raise SkipCase("the compiled kernels are not built here: NumPy serves all batches")
-    before = os.environ.get("KR16_ENGINE")
-    os.environ["KR16_ENGINE"] = "native"
-    try:
+    with using_engine("native"):
         return Robot(robot.data, payload=robot.payload, drives=robot.drives)
-    finally:
-        if before is None:
-            del os.environ["KR16_ENGINE"]
-        else:
-            os.environ["KR16_ENGINE"] = before
 
 
 def _native(name: str, quantity: Quantity) -> None:
@@ -235,21 +228,7 @@ def _fall(robot: Robot, q: Array, qd: Array, tau: Array, times: Array) -> Array:
     def accelerate(*state: Array) -> Array:
         return np.array(robot.arm.forward_dynamics(*(v.tolist() for v in state)))
 
-    return _integrated(accelerate, q, qd, tau, times)
-
-
-def _integrated(
-    accelerate: Callable[..., Array], q: Array, qd: Array, tau: Array, times: Array
-) -> Array:
-    from scipy.integrate import solve_ivp
-
-    def rate(_: float, state: Array) -> Array:
-        return np.concatenate([state[6:], accelerate(state[:6], state[6:], tau)])
-
-    start = np.concatenate([q, qd])
-    span = (0.0, float(times[-1]))
-    solved = solve_ivp(rate, span, start, "DOP853", times, rtol=1e-9, atol=1e-10)
-    return np.asarray(solved.y[:6].T)
+    return integrated(accelerate, q, qd, tau, times)
 
 
 def _motion(name: str) -> None:
@@ -270,6 +249,7 @@ def _motion(name: str) -> None:
         unit="rad",
         reason="errors of 1e-10 a step grow by two to three decades in 2 s of free motion",
         functions=("kr16cli.Robot.forward_dynamics",),
+        engine=name,
     )
     def motion(setting: Setting) -> Finding:
         sampling.need_links(setting.robot.data)
@@ -282,7 +262,7 @@ def _motion(name: str) -> None:
         if own_steps:
             theirs = other.motion(q, qd, tau, times)  # type: ignore[attr-defined]
         else:
-            theirs = _integrated(other.forward_dynamics, q, qd, tau, times)
+            theirs = integrated(other.forward_dynamics, q, qd, tau, times)
         figures = {"time": times.tolist(), "gap": gap(ours, theirs).tolist()}
         text = f"{times[-1]:g} s; the arm moved by up to {np.abs(ours - q).max():.2g} rad"
         return finding(gap(ours, theirs), text, figures=figures, q=ours)

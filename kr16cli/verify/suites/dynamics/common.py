@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from kr16cli import Robot
 from kr16cli.verify import sampling
 from kr16cli.verify.independent.lagrange import Lagrangian
-from kr16cli.verify.records import Setting
+from kr16cli.verify.measure import finding, largest
+from kr16cli.verify.records import Finding, Setting
 
 
 class Motion(NamedTuple):
@@ -33,6 +34,30 @@ def variants(setting: Setting) -> Iterator[tuple[Robot, Lagrangian]]:
     for load, field in ((None, None), (sampling.LOAD, None), (sampling.LOAD, sampling.TILTED)):
         own = data if field is None else data.with_gravity(field)
         yield Robot(own, payload=load), Lagrangian(own, load)
+
+
+def over_variants(
+    setting: Setting,
+    name: str,
+    samples: tuple[int, int],
+    compare: Callable[[Robot, Lagrangian, Motion], sampling.Array],
+    text: str,
+    inputs: str = "q qd qdd",
+) -> Finding:
+    """The worst of a comparison at the same random motions of all variants.
+
+    Args:
+        setting: of the run.
+        name: seeds the motions.
+        samples: how many, full and quick.
+        compare: error of each motion, of a robot beside its Lagrangian.
+        text: what was compared.
+        inputs: which of q, qd, qdd the comparison depends on.
+    """
+    m = motion(setting, name, *samples)
+    errors = [compare(robot, other, m) for robot, other in variants(setting)]
+    shown = {k: v for k, v in m._asdict().items() if k in inputs.split()}
+    return finding(largest(*errors), f"{text}, three variants", **shown)
 
 
 def other_arms(setting: Setting, name: str) -> Iterator[tuple[Robot, Lagrangian, Motion]]:

@@ -13,7 +13,13 @@ from kr16cli.verify.independent.rotations import derivative
 from kr16cli.verify.measure import finding, gap, largest, relative
 from kr16cli.verify.records import Finding, Setting
 from kr16cli.verify.registry import case
-from kr16cli.verify.suites.dynamics.common import FROM_ROUNDING, VARIANTS, motion, variants
+from kr16cli.verify.suites.dynamics.common import (
+    FROM_ROUNDING,
+    VARIANTS,
+    Motion,
+    motion,
+    over_variants,
+)
 
 
 @case(
@@ -31,15 +37,15 @@ from kr16cli.verify.suites.dynamics.common import FROM_ROUNDING, VARIANTS, motio
 )
 def sum_of_terms(setting: Setting) -> Finding:
     """Three recursions agree."""
-    m = motion(setting, "sum-of-terms", 10000, 300)
-    errors = []
-    for robot, _ in variants(setting):
+
+    def compare(robot: Robot, _: Lagrangian, m: Motion) -> sampling.Array:
         tau = robot.inverse_dynamics(*m)
         swing = (robot.coriolis_matrix(m.q, m.qd) @ m.qd[..., None])[..., 0]
         terms = (robot.mass_matrix(m.q) @ m.qdd[..., None])[..., 0] + swing + robot.gravity(m.q)
         twice = np.einsum("nkij,ni,nj->nk", robot.christoffel(m.q), m.qd, m.qd)
-        errors += [relative(terms, tau), relative(twice, swing)]
-    return finding(largest(*errors), "six torques, three variants", **m._asdict())
+        return largest(relative(terms, tau), relative(twice, swing))
+
+    return over_variants(setting, "sum-of-terms", (10000, 300), compare, "six torques")
 
 
 @case(
@@ -57,13 +63,13 @@ def sum_of_terms(setting: Setting) -> Finding:
 )
 def skew(setting: Setting) -> Finding:
     """Passivity."""
-    m = motion(setting, "skew", 3000, 150)
-    errors = []
-    for robot, other in variants(setting):
+
+    def compare(robot: Robot, other: Lagrangian, m: Motion) -> sampling.Array:
         M_dot = derivative(other.mass_matrix, (m.q, m.qd))
         C = robot.coriolis_matrix(m.q, m.qd)
-        errors.append(relative(C + np.swapaxes(C, -1, -2), M_dot, 2))
-    return finding(largest(*errors), "C + C^T - M', three variants", q=m.q, qd=m.qd)
+        return relative(C + np.swapaxes(C, -1, -2), M_dot, 2)
+
+    return over_variants(setting, "skew", (3000, 150), compare, "C + C^T - M'", "q qd")
 
 
 @case(
@@ -144,20 +150,20 @@ def first_joint(setting: Setting) -> Finding:
 )
 def power(setting: Setting) -> Finding:
     """Work and energy."""
-    m = motion(setting, "power", 3000, 150)
-    errors = []
-    for robot, _ in variants(setting):
 
-        def total(t: float, of: Robot = robot) -> sampling.Array:
+    def compare(robot: Robot, _: Lagrangian, m: Motion) -> sampling.Array:
+        def total(t: float) -> sampling.Array:
             q = m.q + m.qd * t + m.qdd * (t * t / 2)
-            return np.asarray(sum(of.energy(q, m.qd + m.qdd * t)))
+            return np.asarray(sum(robot.energy(q, m.qd + m.qdd * t)))
 
         h = 1e-3
         rate = (8 * (total(h) - total(-h)) - (total(2 * h) - total(-2 * h))) / (12 * h)
         tau = robot.inverse_dynamics(*m)
         power = (tau * m.qd).sum(axis=1)
-        errors.append(np.abs(rate - power) / np.maximum(np.abs(tau * m.qd).sum(axis=1), 1.0))
-    return finding(largest(*errors), "three variants", **m._asdict())
+        size = np.maximum(np.abs(tau * m.qd).sum(axis=1), 1.0)
+        return np.asarray(np.abs(rate - power) / size)
+
+    return over_variants(setting, "power", (3000, 150), compare, "tau . qd")
 
 
 @case(
@@ -174,16 +180,16 @@ def power(setting: Setting) -> Finding:
 )
 def time_reversal(setting: Setting) -> Finding:
     """Even in the speeds."""
-    m = motion(setting, "time-reversal", 5000, 200)
-    errors = []
-    for robot, _ in variants(setting):
+
+    def compare(robot: Robot, _: Lagrangian, m: Motion) -> sampling.Array:
         back = m._replace(qd=-m.qd)
         C = robot.coriolis_matrix(m.q, m.qd)
-        errors += [
+        return largest(
             relative(robot.inverse_dynamics(*back), robot.inverse_dynamics(*m)),
             relative(robot.coriolis_matrix(m.q, 2 * m.qd), 2 * C, 2),
-        ]
-    return finding(largest(*errors), "three variants", **m._asdict())
+        )
+
+    return over_variants(setting, "time-reversal", (5000, 200), compare, "tau and C")
 
 
 @case(

@@ -19,7 +19,7 @@ from kr16cli.verify.suites.dynamics.common import (
     Motion,
     motion,
     other_arms,
-    variants,
+    over_variants,
 )
 
 _TOLERANCE = 1e-12
@@ -40,9 +40,11 @@ _TOLERANCE = 1e-12
 )
 def mass_matrix(setting: Setting) -> Finding:
     """M."""
-    m = motion(setting, "mass-matrix", 5000, 200)
-    errors = [relative(r.mass_matrix(m.q), o.mass_matrix(m.q), 2) for r, o in variants(setting)]
-    return finding(largest(*errors), "all 36 entries, three variants", q=m.q)
+    return over_variants(
+        setting, "mass-matrix", (5000, 200),
+        lambda r, o, m: relative(r.mass_matrix(m.q), o.mass_matrix(m.q), 2),
+        "all 36 entries", "q",
+    )  # fmt: skip
 
 
 @case(
@@ -64,14 +66,17 @@ def mass_matrix(setting: Setting) -> Finding:
 )
 def coriolis(setting: Setting) -> Finding:
     """C and its symbols, entry by entry."""
-    m = motion(setting, "coriolis", 1500, 30)
-    errors = []
-    for robot, other in variants(setting):
+
+    def compare(robot: Robot, other: Lagrangian, m: Motion) -> sampling.Array:
         symbols = other.christoffel(m.q)
         C = np.einsum("nkij,ni->nkj", symbols, m.qd)
-        errors.append(relative(robot.christoffel(m.q), symbols, 3))
-        errors.append(relative(robot.coriolis_matrix(m.q, m.qd), C, 2))
-    return finding(largest(*errors), "216 symbols and 36 entries, three variants", q=m.q, qd=m.qd)
+        return largest(
+            relative(robot.christoffel(m.q), symbols, 3),
+            relative(robot.coriolis_matrix(m.q, m.qd), C, 2),
+        )
+
+    text = "216 symbols and 36 entries"
+    return over_variants(setting, "coriolis", (1500, 30), compare, text, "q qd")
 
 
 @case(
@@ -89,9 +94,10 @@ def coriolis(setting: Setting) -> Finding:
 )
 def gravity(setting: Setting) -> Finding:
     """G."""
-    m = motion(setting, "gravity", 5000, 300)
-    errors = [relative(r.gravity(m.q), o.gravity(m.q), 1, 1.0) for r, o in variants(setting)]
-    return finding(largest(*errors), "six torques, three variants", q=m.q)
+    return over_variants(
+        setting, "gravity", (5000, 300),
+        lambda r, o, m: relative(r.gravity(m.q), o.gravity(m.q), 1, 1.0), "six torques", "q",
+    )  # fmt: skip
 
 
 @case(
@@ -109,11 +115,10 @@ def gravity(setting: Setting) -> Finding:
 )
 def inverse(setting: Setting) -> Finding:
     """Newton-Euler against Lagrange."""
-    m = motion(setting, "inverse", 2000, 50)
-    errors = [
-        relative(r.inverse_dynamics(*m), o.inverse_dynamics(*m)) for r, o in variants(setting)
-    ]
-    return finding(largest(*errors), "six torques, three variants", **m._asdict())
+    return over_variants(
+        setting, "inverse", (2000, 50),
+        lambda r, o, m: relative(r.inverse_dynamics(*m), o.inverse_dynamics(*m)), "six torques",
+    )  # fmt: skip
 
 
 @case(
@@ -131,12 +136,11 @@ def inverse(setting: Setting) -> Finding:
 )
 def forward(setting: Setting) -> Finding:
     """Accelerations back."""
-    m = motion(setting, "forward", 2000, 50)
-    errors = [
-        gap(r.forward_dynamics(m.q, m.qd, o.inverse_dynamics(*m)), m.qdd)
-        for r, o in variants(setting)
-    ]
-    return finding(largest(*errors), "six accelerations, three variants", **m._asdict())
+    return over_variants(
+        setting, "forward", (2000, 50),
+        lambda r, o, m: gap(r.forward_dynamics(m.q, m.qd, o.inverse_dynamics(*m)), m.qdd),
+        "six accelerations",
+    )  # fmt: skip
 
 
 @case(
@@ -154,13 +158,7 @@ def forward(setting: Setting) -> Finding:
 )
 def energy(setting: Setting) -> Finding:
     """Energies."""
-    m = motion(setting, "energy", 5000, 200)
-    return finding(
-        largest(*(_energy_gap(r, o, m) for r, o in variants(setting))),
-        "two energies, three variants",
-        q=m.q,
-        qd=m.qd,
-    )
+    return over_variants(setting, "energy", (5000, 200), _energy_gap, "two energies", "q qd")
 
 
 def _energy_gap(robot: Robot, other: Lagrangian, m: Motion) -> sampling.Array:
@@ -183,9 +181,10 @@ def _energy_gap(robot: Robot, other: Lagrangian, m: Motion) -> sampling.Array:
 )
 def base_wrench(setting: Setting) -> Finding:
     """Foundation loads."""
-    m = motion(setting, "base-wrench", 3000, 150)
-    errors = [relative(r.base_wrench(*m), o.base_wrench(*m)) for r, o in variants(setting)]
-    return finding(largest(*errors), "force and moment, three variants", **m._asdict())
+    return over_variants(
+        setting, "base-wrench", (3000, 150),
+        lambda r, o, m: relative(r.base_wrench(*m), o.base_wrench(*m)), "force and moment",
+    )  # fmt: skip
 
 
 @case(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from kr16cli import Robot
@@ -163,15 +165,14 @@ def base_parameters(setting: Setting) -> Finding:
     m = motion(setting, "base-parameters", 200, 40)
     g = setting.robot.data.geometry
     cs, qd, qdd = ARRAYS.trig(list(m.q.T)), list(m.qd.T), list(m.qdd.T)
-    zero, ranks = np.zeros(len(m.q)), []
+    ranks = []
+    # Column i of the identity, down a new axis: 60 robots of one unit parameter each at once.
+    numbers = np.eye(60).reshape(6, 10, 60, 1)
+    links = [inertia.Body(v[0], (v[1], v[2], v[3]), *v[4:]) for v in numbers]
     for field in (sampling.TILTED, (0.0, 0.0, -9.81)):
-        columns = []
-        for i in range(60):
-            numbers = [[float(10 * k + j == i) for j in range(10)] for k in range(6)]
-            links = [inertia.Body(v[0], (v[1], v[2], v[3]), *v[4:]) for v in numbers]
-            tau = model.inverse_dynamics(cs, qd, qdd, links, g, field)
-            columns.append(np.concatenate([zero + t for t in tau]))
-        sigma = np.linalg.svd(np.stack(columns, axis=-1), compute_uv=False)
+        tau: Any = model.inverse_dynamics(cs, qd, qdd, links, g, field)
+        regressor = np.stack([np.broadcast_to(t, (60, len(m.q))) for t in tau])
+        sigma = np.linalg.svd(np.moveaxis(regressor, 1, -1).reshape(-1, 60), compute_uv=False)
         ranks.append(int((sigma > 1e-9 * sigma[0]).sum()))
     wrong = [float(r != e) for r, e in zip(ranks, (38, 36), strict=True)]
     return finding([sum(wrong)], f"ranks {ranks[0]} and {ranks[1]} from {len(m.q)} motions")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from kr16cli import Robot
 from kr16cli.robot import Geometry
@@ -26,7 +27,7 @@ from kr16cli.verify.suites.inverse.closure import (
 _IK = ("kr16cli.Robot.ik", "kr16cli.model.inverse.solve")
 
 
-def _anywhere(rng: sampling.Random, n: int, reach: float) -> Array:
+def anywhere(rng: sampling.Random, n: int, reach: float) -> Array:
     """Random poses in a box around the arm, in and out of reach."""
     poses = np.zeros((n, 4, 4))
     poses[:, :3, :3] = from_abc(rng.uniform(-np.pi, np.pi, (n, 3)))
@@ -49,15 +50,19 @@ def _set_gap(rows: Array, others: Array) -> Array:
 
 def _compared(robot: Robot, poses: Array) -> tuple[Array, Array]:
     """Errors and poses, those within 1e-4 of a singular family left out."""
+    poses = poses[clear_of_singular(robot, poses)]
+    others = roots.quartic(robot.data.geometry, poses).angles
+    return _set_gap(robot.ik(poses), others), poses
+
+
+def clear_of_singular(robot: Robot, poses: Array) -> npt.NDArray[np.bool_]:
+    """Which poses have no branch within about 1e-2 (elbow), 1e-2 m, 1e-3 of a singular family."""
     g = robot.data.geometry
-    others = roots.quartic(g, poses).angles
-    rows = robot.ik(poses)
-    safe = np.nan_to_num(rows, nan=0.5)
+    safe = np.nan_to_num(robot.ik(poses), nan=0.5)
     wrist = poses[:, :3, 3] - g.d6 * poses[:, :3, 2]
     clear = np.abs(np.abs(elbow_cosines(robot, poses)) - 1.0).min(axis=1) > 1e-4
     clear &= np.hypot(wrist[:, 0], wrist[:, 1]) > 1e-2
-    clear &= np.abs(np.sin(safe[..., 4])).min(axis=1) > 1e-3
-    return _set_gap(rows, others)[clear], poses[clear]
+    return np.asarray(clear & (np.abs(np.sin(safe[..., 4])).min(axis=1) > 1e-3))
 
 
 @case(
@@ -79,7 +84,7 @@ def complete(setting: Setting) -> Finding:
     rng, robot = sampling.random(setting, "complete"), setting.robot.with_tool(None)
     n = setting.samples(20000, 400)
     made = poe.flange(robot.data.geometry, sampling.generic(rng, n))
-    error, poses = _compared(robot, np.concatenate([made, _anywhere(rng, n, 2.0)]))
+    error, poses = _compared(robot, np.concatenate([made, anywhere(rng, n, 2.0)]))
     found = known(robot.ik(poses)).sum(axis=1)
     count = np.bincount(found, minlength=9)
     text = f"solutions per pose: 0 for {count[0]}, 4 for {count[4]}, 8 for {count[8]} poses"
@@ -109,7 +114,7 @@ def complete_other_arms(setting: Setting) -> Finding:
         g = Geometry(*map(float, rng.uniform(low, high)))
         robot = Robot(replace(setting.robot.data, geometry=g))
         made = poe.flange(g, sampling.generic(rng, 100))
-        error, kept = _compared(robot, np.concatenate([made, _anywhere(rng, 100, 2.0)]))
+        error, kept = _compared(robot, np.concatenate([made, anywhere(rng, 100, 2.0)]))
         errors.append(np.where(outside_principal(robot.ik(kept)), np.inf, error))
         poses.append(kept)
     return finding(np.concatenate(errors), "sets of solutions", T=np.concatenate(poses))
@@ -186,7 +191,7 @@ def reach(setting: Setting) -> Finding:
     """The numbers behind `why`."""
     rng, robot = sampling.random(setting, "reach"), setting.robot
     g = robot.data.geometry
-    poses = _anywhere(rng, setting.samples(1000, 100), 2.5)
+    poses = anywhere(rng, setting.samples(1000, 100), 2.5)
     wrist = poses[:, :3, 3] - g.d6 * poses[:, :3, 2]
     forward = np.hypot(wrist[:, 0], wrist[:, 1])[:, None] * np.array([1.0, -1.0]) - g.a1
     square = forward**2 + (wrist[:, 2] - g.d1)[:, None] ** 2

@@ -174,10 +174,9 @@ def pose_distance(setting: Setting) -> Finding:
     angle[: n // 4] = math.pi  # half turns, where a cosine can round beyond -1
     shift = rng.normal(size=(n, 3))
     moved = poses.copy()
-    for i in range(n):
-        axis = rng.normal(size=3)
-        turn = about_axis(axis / np.linalg.norm(axis), np.array(angle[i]))
-        moved[i, :3, :3] = turn @ poses[i, :3, :3]
+    axes = rng.normal(size=(n, 3))
+    turns = about_axis(axes / np.linalg.norm(axes, axis=1, keepdims=True), angle)
+    moved[:, :3, :3] = turns @ poses[:, :3, :3]
     moved[:, :3, 3] += shift
     length = np.linalg.norm(shift, axis=1)
     distance, found = robot.closure(moved, q)

@@ -236,7 +236,7 @@ def links(setting: Setting) -> Finding:
 def single(setting: Setting) -> Finding:
     """The float path."""
     rng, robot = sampling.random(setting, "single-J"), setting.robot.with_tool(None)
-    n, arm = setting.samples(60, 10), setting.robot.arm
+    n, arm = setting.samples(60, 5), setting.robot.arm
     q, qd = sampling.generic(rng, n), sampling.rates(rng, n)
     factors = robot.singularity(q)
     error = np.abs([arm.determinant(row) for row in q.tolist()] - factors.determinant)

@@ -1,0 +1,105 @@
+/* Saved states: the core as it is. The first eight bytes are 0, as one importer frees them. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "kr16_fmu.h"
+
+typedef struct {
+    uint64_t zero, build, check;
+    kr16_core core;
+} saved;
+
+/* FNV-1a. */
+static uint64_t hash(uint64_t h, const void *bytes, size_t size)
+{
+    const unsigned char *b = bytes;
+    for (size_t i = 0; i < size; i++)
+        h = (h ^ b[i]) * 1099511628211u;
+    return h;
+}
+
+static uint64_t build(void)
+{
+    const size_t size = sizeof(saved);
+    return hash(hash(14695981039346656037u, &size, sizeof size), kr16_robot.token,
+                sizeof kr16_robot.token);
+}
+
+size_t kr16_state_size(void)
+{
+    return sizeof(saved);
+}
+
+static int usable(kr16_instance *instance, const saved *state, const char *call)
+{
+    if (!state)
+        return kr16_fail(instance, "%s: no state is given (NULL)", call);
+    if (state->zero != 0 || state->build != build())
+        return kr16_fail(instance, "%s: the bytes are no state of this build of the FMU", call);
+    return OK;
+}
+
+int kr16_save(kr16_instance *instance, void **state)
+{
+    saved *s = *state;
+    if (s && usable(instance, s, "getFMUState") != OK)
+        return ERROR;
+    if (!s && !(s = calloc(1, sizeof *s)))
+        return kr16_fail(instance, "getFMUState: out of memory");
+    s->build = build();
+    memcpy(&s->core, &instance->core, sizeof s->core);
+    *state = s;
+    return OK;
+}
+
+int kr16_restore(kr16_instance *instance, const void *state)
+{
+    const saved *s = state;
+    if (usable(instance, s, "setFMUState") != OK)
+        return ERROR;
+    memcpy(&instance->core, &s->core, sizeof s->core);
+    return OK;
+}
+
+int kr16_forget(kr16_instance *instance, void **state)
+{
+    if (!state)
+        return kr16_fail(instance, "freeFMUState: no state is given (NULL)");
+    free(*state);
+    *state = NULL;
+    return OK;
+}
+
+int kr16_write_state(kr16_instance *instance, const void *state, void *bytes, size_t size)
+{
+    const saved *s = state;
+    if (usable(instance, s, "serializeFMUState") != OK)
+        return ERROR;
+    if (!bytes || size < sizeof *s)
+        return kr16_fail(instance, "serializeFMUState: %lu bytes are too few; %lu are needed",
+                         bytes ? (unsigned long)size : 0ul, (unsigned long)sizeof *s);
+    memset(bytes, 0, size);
+    memcpy(bytes, s, sizeof *s);
+    const uint64_t check = hash(s->build, &s->core, sizeof s->core);
+    memcpy((char *)bytes + offsetof(saved, check), &check, sizeof check);
+    return OK;
+}
+
+int kr16_read_state(kr16_instance *instance, const void *bytes, size_t size, void **state)
+{
+    saved *s = state ? calloc(1, sizeof *s) : NULL;
+    if (!state)
+        return kr16_fail(instance, "deserializeFMUState: no place for the state (NULL)");
+    if (!s)
+        return kr16_fail(instance, "deserializeFMUState: out of memory");
+    if (bytes && size >= sizeof *s)
+        memcpy(s, bytes, sizeof *s);
+    if (s->zero != 0 || s->build != build() || s->check != hash(s->build, &s->core, sizeof s->core)) {
+        free(s);
+        return kr16_fail(instance, "deserializeFMUState: the %lu bytes are no state of this build "
+                                   "of the FMU", bytes ? (unsigned long)size : 0ul);
+    }
+    s->check = 0;
+    *state = s;
+    return OK;
+}

@@ -1,0 +1,34 @@
+"""Write the C of the native FMU's library: `python -m kr16cli.fmi.native.generate FOLDER`.
+
+For the build of the package. The robot inside is replaced when an FMU is built.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from kr16cli.fmi.native import numbers, sources, table
+from kr16cli.fmi.variables import Part, Start
+from kr16cli.robot_file import load_data
+
+
+def generic() -> numbers.Table:
+    """The table that a library is compiled with: that of the KR 16-2, without a token."""
+    data = load_data()
+    known = table.variables(data, Start(q=(0.0,) * 6), Part.ROBOT, version=2)
+    entries = numbers.entries(table.items(known, arrays=False), Part.ROBOT)
+    return numbers.table(data, entries, Part.ROBOT, "", sources.digest())
+
+
+def write(folder: Path) -> None:
+    """All files into a folder; those that have not changed are left alone."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in sources.complete(generic()).items():
+        file = folder / name
+        if not file.is_file() or file.read_text(encoding="utf-8") != text:
+            file.write_text(text, encoding="utf-8", newline="\n")
+
+
+if __name__ == "__main__":
+    write(Path(sys.argv[1]))
