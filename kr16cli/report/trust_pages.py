@@ -38,7 +38,7 @@ def trust(document: Document, content: Content) -> None:
     left = page.axes(196, LEFT + 40, middle, move=False)
     study_figures.gravity_bands(left, result)
     left.legend(loc="upper left", bbox_to_anchor=(-0.15, -0.08), ncols=2)  # clear of the marks
-    study_figures.importance_bars(page.axes(196, middle + 138, RIGHT - 6), result)
+    study_figures.importance_bars(page.axes(196, middle + 138, RIGHT - 6, below=40), result)
     poses = "; ".join(_pose(q) for q in result["poses_deg"])
     page.caption(
         f"Left: a mark each for A = {poses} deg, in this order. Right: at the first of them; "

@@ -1,8 +1,8 @@
 """Reach maps beside the raw IK kernel, printed: `--benchmark-enable -s` measures in full.
 
 Due on an idle machine: 10 million poses, judged, counted and written, at 90 % of the speed at
-which the kernel alone answers the same poses from memory. One thread's processor time is compared, which
-neighbours on the machine disturb less than the clock on the wall.
+which the kernel alone answers the same poses from memory. One thread's processor time is
+compared, which neighbours on the machine disturb less than the clock on the wall.
 """
 
 from __future__ import annotations

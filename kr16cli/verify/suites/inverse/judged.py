@@ -79,7 +79,7 @@ def _judged(robot: Robot, poses: Array) -> tuple[Array, Array]:
 def judged(setting: Setting) -> Finding:
     """Six numbers."""
     rng, data = sampling.random(setting, "judged"), setting.robot.data
-    n, errors, kept = setting.samples(5000, 80), [], []
+    n, errors, kept = setting.samples(1500, 80), [], []
     for k in range(3):
         own = data
         if k:
