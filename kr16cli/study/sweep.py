@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from kr16cli.arrays import Array
-from kr16cli.errors import Kr16Error
+from kr16cli.errors import FileError, Kr16Error
 from kr16cli.robot import RobotData
 from kr16cli.robot_file import parse_data
 from kr16cli.simulate.experiment import simulate
@@ -119,8 +119,8 @@ class SweepWork:
             data, run = self.one(values)
         except Kr16Error as error:
             absent = {name: np.full(c.shape, np.nan) for name, c in FIGURES.items()}
-            return {**absent, "limits_passed": -1, "status": " ".join(str(error).split())[:_STATUS]}
-        status = "ok" if run.failure is None else " ".join(run.failure.split())[:_STATUS]
+            return {**absent, "limits_passed": -1, "status": _words(_reason(error))}
+        status = "ok" if run.failure is None else _words(run.failure)
         return {**figures(run, data), "status": status}
 
     def one(self, values: list[float]) -> tuple[RobotData, Run]:
@@ -192,3 +192,13 @@ def flat_columns(work: SweepWork, chunk: Mapping[str, Any]) -> dict[str, Array]:
         else:
             made[name] = values
     return made
+
+
+def _reason(error: Kr16Error) -> str:
+    """Why there is no run, without the file's place: answers are the same on every machine."""
+    return error.reason if isinstance(error, FileError) else str(error)
+
+
+def _words(text: str) -> str:
+    """One line that fits the column."""
+    return " ".join(text.split())[:_STATUS]
