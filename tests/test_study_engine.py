@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import kr16cli
 from kr16cli.errors import FileError, InputError
 from kr16cli.study import engine, store, work
 from kr16cli.study.session import finished, partial_folder, write_npz
@@ -131,7 +132,7 @@ def test_a_killed_process_leaves_chunks_from_which_the_next_goes_on(tmp_path):
     marks, output = tmp_path / "marks", tmp_path / "out.npz"
     marks.mkdir()
     here = Path(__file__).resolve().parent
-    paths = [str(here), str(here.parent)]
+    paths = [str(here), str(Path(kr16cli.__file__).resolve().parent.parent)]
     script = _KILLED.format(paths=paths, marks=str(marks), output=str(output))
     process = subprocess.Popen([sys.executable, "-c", script])
     folder, deadline = partial_folder(output), time.monotonic() + 60

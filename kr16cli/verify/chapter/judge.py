@@ -120,7 +120,8 @@ def _exactly(forms: Sequence[Values], truth: Values, bench: Bench) -> str:
     if degree == 0:
         return "exact: constants"
     return (
-        f"exact: fractions at {n} random rational points (seed {bench.seed}), degree <= {degree}, "
+        f"exact: fractions at {n} random rational point{'s' * (n > 1)} (seed {bench.seed}), "
+        f"degree <= {degree}, "
         f"each variable from {CHOICES} values: a false identity passes with probability "
         f"<= {(degree / CHOICES) ** n:.0e}"
     )

@@ -81,7 +81,7 @@ def _torque_gap(robot: Robot, other: Lagrangian, m: Motion) -> Array:
 )
 def torque_derivatives(setting: Setting) -> Finding:
     """Against Lagrange, without small steps."""
-    m = motion(setting, "torque-derivatives", 100, 8)
+    m = motion(setting, "torque-derivatives", 100, 4)
     errors = [_torque_gap(robot, other, m) for robot, other in variants(setting)]
     arms = other_arms(setting, "torque-derivatives-arms")
     others = [
@@ -109,7 +109,7 @@ def torque_derivatives(setting: Setting) -> Finding:
 )
 def acceleration_derivatives(setting: Setting) -> Finding:
     """Against Lagrange and NumPy's solver."""
-    m = motion(setting, "acceleration-derivatives", 100, 8)
+    m = motion(setting, "acceleration-derivatives", 100, 4)
     data = setting.robot.data.with_gravity(sampling.TILTED)
     other, v = Lagrangian(data, sampling.LOAD), 0.01
     joints = [(j.coulomb or 0.0, j.viscous or 0.0, j.reflected_inertia) for j in data.joints]

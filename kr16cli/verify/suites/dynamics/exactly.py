@@ -43,11 +43,11 @@ def _vectors(source: random.Random) -> tuple[list[Any], list[Any]]:
 def exactly(setting: Setting) -> Finding:
     """Proof at random points."""
     sampling.need_links(setting.robot.data)
-    source, n, wrong = random.Random(setting.seed), setting.samples(12, 2), 0
+    source, n, wrong = random.Random(setting.seed), setting.samples(12, 1), 0
     rng = sampling.random(setting, "exact")
     for k in range(n):
         other = sampling.random_robot(rng, setting.robot.data)
-        data = exact.robot(setting.robot.data if k % 2 == 0 else exact.rounded(other))
+        data = exact.robot(setting.robot.data if k % 2 else exact.rounded(other))
         g, gravity = data.geometry, data.gravity
         full = inertia.robot_bodies(data.links, exact.payload(sampling.LOAD), g)
         bodies = inertia.regroup(full, g)
@@ -77,7 +77,7 @@ def exactly(setting: Setting) -> Finding:
         wrong += exact.unequal(summed, C)
         solved = dynamics.solve_symmetric(M, qdd)
         wrong += exact.unequal([_times(M, solved)], [qdd])
-    text = f"about 200 entries at each of {n} points, for two kinds of robot"
+    text = f"about 200 entries at each of {n} points; random links, in a full run this robot's too"
     return Finding(float(wrong), n, {}, text)
 
 

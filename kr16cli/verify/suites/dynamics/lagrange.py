@@ -236,7 +236,7 @@ def any_arm(setting: Setting) -> Finding:
 )
 def single(setting: Setting) -> Finding:
     """The float path."""
-    m = motion(setting, "single-dynamics", 100, 6)
+    m = motion(setting, "single-dynamics", 100, 4)
     robot = Robot(setting.robot.data, payload=sampling.LOAD, drives=True)
     arm = robot.arm
     tau = robot.inverse_dynamics(*m)

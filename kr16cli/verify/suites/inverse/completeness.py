@@ -159,7 +159,7 @@ def newton(setting: Setting) -> Finding:
     """Counting by search."""
     rng, robot = sampling.random(setting, "newton"), setting.robot.with_tool(None)
     g = robot.data.geometry
-    n, starts = setting.samples(40, 2), setting.samples(200, 40)
+    n, starts = setting.samples(40, 2), setting.samples(200, 30)
     q = sampling.regular(rng, n, robot.data)
     poses = poe.flange(g, q)
     rows = robot.ik(poses)

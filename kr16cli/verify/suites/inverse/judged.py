@@ -26,10 +26,9 @@ _EDGE = 1e-6
 """Branches this near a limit (rad) may count or not."""
 
 
-def _judged(robot: Robot, poses: Array) -> tuple[Array, Array]:
-    """(n, 6) what the branches are worth by the quartic, and which poses rounding may decide."""
+def _worth(robot: Robot, rows: Array) -> tuple[Array, Array]:
+    """(n, 6) what solutions (n, 8, 6) are worth, and of which poses one is near a limit."""
     g, joints = robot.data.geometry, robot.data.joints
-    rows = roots.quartic(g, poses).angles
     there = known(rows)
     q = np.where(there[..., None], rows, 0.3)
     lower, upper = (np.array([getattr(j, side) for j in joints]) for side in ("lower", "upper"))
@@ -79,7 +78,7 @@ def _judged(robot: Robot, poses: Array) -> tuple[Array, Array]:
 def judged(setting: Setting) -> Finding:
     """Six numbers."""
     rng, data = sampling.random(setting, "judged"), setting.robot.data
-    n, errors, kept = setting.samples(1500, 80), [], []
+    n, errors, kept = setting.samples(1500, 50), [], []
     for k in range(3):
         own = data
         if k:
@@ -97,9 +96,44 @@ def judged(setting: Setting) -> Finding:
         made = poe.flange(own.geometry, np.concatenate([inside, sampling.generic(rng, n)]))
         poses = np.concatenate([made, anywhere(rng, n, 2.0)])
         poses = poses[clear_of_singular(robot, poses)]
-        theirs, unsure = _judged(robot, poses)
+        theirs, unsure = _worth(robot, roots.quartic(own.geometry, poses).angles)
         found = robot.judge_branches(poses)
         errors.append(np.abs(found - theirs).max(axis=1)[~unsure])
         kept.append(poses[~unsure])
     error, poses = np.concatenate(errors), np.concatenate(kept)
     return finding(error, f"six numbers of {len(poses)} poses, three arms", T=poses)
+
+
+@case(
+    "inverse.judged-edges",
+    title="What the branches of singular poses and of poses at the limits are worth",
+    statement="a merged pair counts twice, a free joint is taken as 0, a branch exactly at a limit "
+    "is within it, and |det J| of singular branches is 0",
+    regime="q5 = 0 or 180 deg, stretched arms, and wrist joints exactly at their limits",
+    method="the rows of ik with near = 0 judged one by one, |det J| by LAPACK on the product of "
+    "exponentials",
+    grade="C",
+    tolerance=1e-6,
+    unit="1, m3, rad",
+    reason="the stretched elbow is known to 1e-7; a wrong count is 1 or more",
+    functions=("kr16cli.Robot.judge_branches", "kr16cli.model.branches.judge"),
+)
+def judged_edges(setting: Setting) -> Finding:
+    """Where rounding must not decide."""
+    rng, data, n = sampling.random(setting, "judged-edges"), setting.robot.data, 60
+    # With A4 held to +-0.2 rad a free A4 decides whether a branch is within.
+    held = replace(data.joints[3], lower=-0.2, upper=0.2)
+    narrow = replace(data, joints=(*data.joints[:3], held, *data.joints[4:]))
+    errors, kept = [], []
+    for own in (data, narrow):
+        robot = Robot(own)
+        lower, upper = (np.array([getattr(j, s) for j in own.joints]) for s in ("lower", "upper"))
+        side = rng.random((n, 6)) < 0.5
+        inside = np.array([0.3, 0.3, 0.3, 0.0, 0.0, 0.0])  # the arm's joints off, the wrist's at
+        at_limits = np.where(side, lower + inside, upper - inside)
+        parts = (sampling.on_wrist(rng, n, own), sampling.on_elbow(rng, n, own), at_limits)
+        poses = np.concatenate([poe.flange(own.geometry, q) for q in parts])
+        theirs, _ = _worth(robot, robot.ik(poses, np.zeros(6)))
+        errors.append(np.abs(robot.judge_branches(poses) - theirs).max(axis=1))
+        kept.append(poses)
+    return finding(np.concatenate(errors), "six numbers, two ranges of A4", T=np.concatenate(kept))
