@@ -149,7 +149,14 @@ class Arm:
         `point` (m) is fixed to `link` (1..6) and given in its frame (frame i of Table 3.1; the
         flange for link 6); None is that frame's origin. `axes` are the axes of the rows.
         """
+        if link == 6 and point is None and axes == "robroot":
+            return self.flange_jacobian(q)
         view = View.of(self.geometry, link, point, axes)
+        return _floats(view.jacobian(FLOATS.trig(q)))
+
+    def flange_jacobian(self, q: Sequence[float]) -> Matrix:
+        """`jacobian` of the flange in robroot axes."""
+        view = View.of(self.geometry, 6, None, "robroot")
         return _floats(view.jacobian(FLOATS.trig(q)))
 
     def jacobian_dot(
@@ -162,7 +169,14 @@ class Arm:
         axes: Axes = "robroot",
     ) -> Matrix:
         """Rate of the robroot components along qd, shown in `axes` (which stand still)."""
+        if link == 6 and point is None and axes == "robroot":
+            return self.flange_jacobian_dot(q, qd)
         view = View.of(self.geometry, link, point, axes)
+        return _floats(view.jacobian_dot(FLOATS.trig(q), qd))
+
+    def flange_jacobian_dot(self, q: Sequence[float], qd: Sequence[float]) -> Matrix:
+        """`jacobian_dot` of the flange in robroot axes."""
+        view = View.of(self.geometry, 6, None, "robroot")
         return _floats(view.jacobian_dot(FLOATS.trig(q), qd))
 
     def determinant(self, q: Sequence[float]) -> float:

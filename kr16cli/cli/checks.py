@@ -86,7 +86,7 @@ def _self_test(ctx: typer.Context) -> int:
         with Bar() as bar:
             for fault in selftest.run(seeded, setting.seed):
                 found[fault.mutant.id] = fault
-                bar.show(len(found), len(seeded), fault.mutant.id)
+                bar.show(len(found), len(seeded), f" {fault.mutant.id}")
         faults = [found[mutant.id] for mutant in seeded]
         extra = fault_text.counts(faults) | {"faults": [f.entry() for f in faults]}
         targets.write(setting.robot.data, inputs, [], extra, fault_text.table(faults))
@@ -204,7 +204,7 @@ def _run(cases: Sequence[Case], setting: Setting) -> list[Result]:
     with Bar() as bar:
         for result in registry.run(cases, setting):
             results.append(result)
-            bar.show(len(results), len(cases), result.id)
+            bar.show(len(results), len(cases), f" {result.id}")
     return results
 
 

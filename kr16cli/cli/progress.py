@@ -15,11 +15,15 @@ class Bar:
         return self
 
     def __exit__(self, *details: object) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Take the line away."""
         if self.shown:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
-    def show(self, done: int, total: int, what: str) -> None:
-        """So many are done of the total, `what` the last of them."""
+    def show(self, done: int, total: int, after: str) -> None:
+        """So many are done of the total; `after` goes on from there."""
         if self.shown:
-            text = f"{'#' * round(30 * done / total):-<30} {done} of {total} {what}"
+            text = f"{'#' * round(30 * done / total):-<30} {done} of {total}{after}"
             print(f"\r\x1b[K{text[:78]}", end="", file=sys.stderr, flush=True)

@@ -13,6 +13,7 @@ import typer
 
 from kr16cli.cli import output as out
 from kr16cli.cli import render, values
+from kr16cli.cli.progress import Bar
 from kr16cli.errors import InputError
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ class _Shown:
 
     def __init__(self, total: int, folder: str | None) -> None:
         self._folder, self._total, self._done = folder, total, 0
-        self._bar = sys.stderr is not None and sys.stderr.isatty()
+        self._bar = Bar()
         self._begun = False
 
     def __call__(self, progress: Progress) -> None:
@@ -98,16 +99,13 @@ class _Shown:
         if not self._begun and progress.done:
             self._say(f"going on: {progress.done} of {progress.total} chunks are there")
         self._begun = True
-        if self._bar:
-            filled = "#" * round(30 * progress.done / progress.total)
-            left = "" if progress.left is None else f", {_duration(progress.left)} left"
-            text = f"{filled:-<30} {progress.done} of {progress.total}{left}"
-            print(f"\r\x1b[K{text[:78]}", end="", file=sys.stderr, flush=True)
+        left = "" if progress.left is None else f", {_duration(progress.left)} left"
+        self._bar.show(progress.done, progress.total, left)
 
     def clear(self) -> None:
         """Take the bar away."""
-        if self._bar and self._begun:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+        if self._begun:
+            self._bar.clear()
 
     def interrupted(self) -> None:
         """Say what an interrupted run leaves."""

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import importlib
-import io
-import os
 import sys
 import tempfile
-import time
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -18,19 +15,16 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-import kr16cli
 from kr16cli.assets import asset
-from kr16cli.errors import CheckFailedError, InputError, MissingPartError
-from kr16cli.fmi import quick, shim, stage, written
+from kr16cli.errors import CheckFailedError, MissingPartError
+from kr16cli.fmi import packing, quick, shim, stage, written
 from kr16cli.fmi.cargo import Cargo
 from kr16cli.fmi.description import guid
 from kr16cli.fmi.variables import TYPES, Part, Start, Variable, table
 from kr16cli.robot import RobotData
 
 MODEL = "KR16"
-_SUBJECT = {Part.ROBOT: "Dynamics of", Part.CONTROLLER: "Controller for"}
 _UNUSED = tuple(f"/pythonfmu/{name}.py" for name in ("__main__", "csvbuilder", "deploy"))
-_OLDEST = (1980, 1, 1, 0, 0, 0)
 
 
 class Options(NamedTuple):
@@ -64,16 +58,19 @@ def build(data: RobotData, options: Options) -> bytes:
         MissingPartError: pythonfmu is not installed.
         CheckFailedError: the compiler failed.
     """
-    if not data.links:
-        raise InputError(f"{data.name} ({data.path}) has no inertial data; an FMU needs six links")
-    _epoch()
+    packing.require_inertia(data)
+    packing.source_time()  # refused before anything is made
     home = _home()
-    cargo = Cargo(_about(data, options), table(data, options.start, options.part), data)
+    version = metadata.version("pythonfmu")
+    about = packing.about(
+        data, options.part, options.scenario,
+        stop=options.stop, step=options.step, tool=f" with PythonFMU {version}",
+    )  # fmt: skip
+    cargo = Cargo(about, table(data, options.start, options.part), data)
     slave, pages = _shipped()
     files = stage.contents(cargo, written.python(), slave)
     library = shim.compiled(options.compiler) if options.compiler else b""
     module = quick.compiled(options.compiler) if options.compiler else b""
-    version = metadata.version("pythonfmu")
     digest = stage.identity(files, version.encode(), library, module)
     with tempfile.TemporaryDirectory(prefix="kr16_fmu_") as folder:
         here = Path(folder)
@@ -93,25 +90,6 @@ def build(data: RobotData, options: Options) -> bytes:
                     "give --no-shim for an FMU without compiled parts"
                 )
         return _packed(made, library, guid(digest))
-
-
-def _about(data: RobotData, options: Options) -> dict[str, object]:
-    """Texts and times of the model description."""
-    scenario = f", set up as the scenario {options.scenario}" if options.scenario else ""
-    return {
-        "description": f"{_SUBJECT[options.part]} the {data.name}{scenario}. "
-        "Not affiliated with KUKA; not for safety functions.",
-        "part": str(options.part),
-        "robot": data.name,
-        "model_sha256": data.sha256,
-        "author": "kr16cli developers",
-        "version": kr16cli.__version__,
-        "copyright": "kr16cli developers",
-        "license": "MIT",
-        "tool": f"kr16cli {kr16cli.__version__} with PythonFMU {metadata.version('pythonfmu')}",
-        "stop": options.stop,
-        "step": options.step,
-    }
 
 
 def _home() -> Path:
@@ -218,24 +196,13 @@ def _packed(made: Path, library: bytes, identity: str) -> bytes:
         entries = {name: archive.read(name) for name in names}
     if library:
         entries = shim.put_in(entries, library, MODEL, identity)
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w") as archive:
-        for name, content in sorted(entries.items()):
-            info = zipfile.ZipInfo(name, _epoch() or _OLDEST)
-            info.compress_type, info.create_system = zipfile.ZIP_DEFLATED, 3
-            info.external_attr = (0o100755 if name.startswith("binaries/") else 0o100644) << 16
-            archive.writestr(info, content)
-    return out.getvalue()
+    return packing.packed(entries, _when())
 
 
-def _epoch() -> tuple[int, int, int, int, int, int] | None:
-    """The time of SOURCE_DATE_EPOCH for a zip entry, or None where it is not set."""
-    text = os.environ.get("SOURCE_DATE_EPOCH")
-    if not text:
-        return None
-    try:
-        year, month, day, hour, minute, second = time.gmtime(int(text))[:6]
-    except (ValueError, OverflowError, OSError):
-        rule = "it must be seconds since 1970, a whole number"
-        raise InputError(f"SOURCE_DATE_EPOCH is {text!r}; {rule}") from None
-    return max((year, month, day, hour, minute, second - second % 2), _OLDEST)
+def _when() -> packing.ZipTime:
+    """The time of every entry: SOURCE_DATE_EPOCH as a zip has it, else the first there is."""
+    found = packing.source_time()
+    if found is None:
+        return packing.OLDEST
+    year, month, day, hour, minute, second = found[:6]
+    return max((year, month, day, hour, minute, second - second % 2), packing.OLDEST)

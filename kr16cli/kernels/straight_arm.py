@@ -8,7 +8,6 @@ from functools import cached_property
 from kr16cli.kernels.parameters import pack, parameters
 from kr16cli.model.inverse import Solutions
 from kr16cli.model.scalars import Trig
-from kr16cli.model.view import Axes
 from kr16cli.robot import Payload, RobotData
 from kr16cli.single import Arm, Base, Matrix
 
@@ -98,31 +97,12 @@ class StraightArm(Arm):
             turn=v[65:],
         )
 
-    def jacobian(
-        self,
-        q: Sequence[float],
-        *,
-        link: int = 6,
-        point: Sequence[float] | None = None,
-        axes: Axes = "robroot",
-    ) -> Matrix:
-        """Geometric Jacobian; see `Arm`."""
-        if link != 6 or point is not None or axes != "robroot":
-            return super().jacobian(q, link=link, point=point, axes=axes)
+    def flange_jacobian(self, q: Sequence[float]) -> Matrix:
+        """Of the flange, robroot axes."""
         return _rows(self._functions["jacobian"](self._numbers, q), 6)
 
-    def jacobian_dot(
-        self,
-        q: Sequence[float],
-        qd: Sequence[float],
-        *,
-        link: int = 6,
-        point: Sequence[float] | None = None,
-        axes: Axes = "robroot",
-    ) -> Matrix:
-        """Rate of the Jacobian; see `Arm`."""
-        if link != 6 or point is not None or axes != "robroot":
-            return super().jacobian_dot(q, qd, link=link, point=point, axes=axes)
+    def flange_jacobian_dot(self, q: Sequence[float], qd: Sequence[float]) -> Matrix:
+        """Its rate."""
         return _rows(self._functions["jacobian_dot"](self._numbers, q, qd), 6)
 
     def mass_matrix(self, q: Sequence[float]) -> Matrix:

@@ -9,7 +9,6 @@ import numpy as np
 from kr16cli.api import Robot
 from kr16cli.kernels.engine import engine_name
 from kr16cli.kernels.straight import straight_arm
-from kr16cli.model.view import Axes
 from kr16cli.single import Arm, Matrix
 
 
@@ -50,32 +49,13 @@ class FastArm(Arm):
         rows: Matrix = self._robot.mass_matrix(np.array(q)).tolist()
         return rows
 
-    def jacobian(
-        self,
-        q: Sequence[float],
-        *,
-        link: int = 6,
-        point: Sequence[float] | None = None,
-        axes: Axes = "robroot",
-    ) -> Matrix:
-        """Geometric Jacobian; see `Arm`."""
-        if link != 6 or point is not None or axes != "robroot":
-            return super().jacobian(q, link=link, point=point, axes=axes)
+    def flange_jacobian(self, q: Sequence[float]) -> Matrix:
+        """Of the flange, robroot axes."""
         rows: Matrix = self._robot.jacobian(np.array(q)).tolist()
         return rows
 
-    def jacobian_dot(
-        self,
-        q: Sequence[float],
-        qd: Sequence[float],
-        *,
-        link: int = 6,
-        point: Sequence[float] | None = None,
-        axes: Axes = "robroot",
-    ) -> Matrix:
-        """Rate of the Jacobian; see `Arm`."""
-        if link != 6 or point is not None or axes != "robroot":
-            return super().jacobian_dot(q, qd, link=link, point=point, axes=axes)
+    def flange_jacobian_dot(self, q: Sequence[float], qd: Sequence[float]) -> Matrix:
+        """Its rate."""
         rows: Matrix = self._robot.jacobian_dot(np.array(q), np.array(qd)).tolist()
         return rows
 

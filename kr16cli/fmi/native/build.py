@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-import io
-import os
 import time
-import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-import kr16cli
-from kr16cli.errors import InputError
+from kr16cli.fmi import packing
 from kr16cli.fmi.description import guid
 from kr16cli.fmi.native import describe2, describe3, numbers, sources, table
 from kr16cli.fmi.native.library import MODEL, libraries
 from kr16cli.fmi.variables import Part, Start
 from kr16cli.robot import RobotData
-
-_SUBJECT = {Part.ROBOT: "Dynamics of", Part.CONTROLLER: "Controller for"}
-_OLDEST = (1980, 1, 1, 0, 0, 0)
 
 
 class Options(NamedTuple):
@@ -52,12 +45,14 @@ def build(data: RobotData, options: Options) -> bytes:
         MissingPartError: a compiler is needed and none is there.
         CheckFailedError: the compiler failed.
     """
-    if not data.links:
-        raise InputError(f"{data.name} ({data.path}) has no inertial data; an FMU needs six links")
+    packing.require_inertia(data)
     known = table.variables(data, options.start, options.part, version=options.version)
     listed = table.items(known, arrays=options.arrays)
     entries = numbers.entries(listed, options.part)
-    about = _about(data, options)
+    about = packing.about(
+        data, options.part, options.scenario, stop=options.stop, step=options.step, tool=""
+    )
+    about["date"] = _date()
     units = sources.units()
 
     def documents(identity: str) -> tuple[numbers.Table, bytes]:
@@ -76,27 +71,7 @@ def build(data: RobotData, options: Options) -> bytes:
     if options.version == 3:
         packed["sources/buildDescription.xml"] = _xml(describe3.build_description(MODEL, units))
     packed |= libraries(content, options.platforms, options.version)
-    return _zipped(packed)
-
-
-def _about(data: RobotData, options: Options) -> dict[str, object]:
-    """Texts and times of the model description."""
-    scenario = f", set up as the scenario {options.scenario}" if options.scenario else ""
-    return {
-        "description": f"{_SUBJECT[options.part]} the {data.name}{scenario}. "
-        "Not affiliated with KUKA; not for safety functions.",
-        "part": str(options.part),
-        "robot": data.name,
-        "model_sha256": data.sha256,
-        "author": "kr16cli developers",
-        "version": kr16cli.__version__,
-        "copyright": "kr16cli developers",
-        "license": "MIT",
-        "tool": f"kr16cli {kr16cli.__version__}",
-        "stop": options.stop,
-        "step": options.step,
-        "date": _date(),
-    }
+    return packing.packed(packed, level=9)
 
 
 def _identity(content: numbers.Table, description: bytes) -> str:
@@ -110,24 +85,7 @@ def _xml(root: ElementTree.Element) -> bytes:
     return head + ElementTree.tostring(root, encoding="unicode").encode() + b"\n"
 
 
-def _zipped(entries: Mapping[str, bytes]) -> bytes:
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w") as archive:
-        for name, content in sorted(entries.items()):
-            info = zipfile.ZipInfo(name, _OLDEST)
-            info.compress_type, info.create_system = zipfile.ZIP_DEFLATED, 3
-            info.external_attr = (0o100755 if name.startswith("binaries/") else 0o100644) << 16
-            archive.writestr(info, content, compresslevel=9)
-    return out.getvalue()
-
-
 def _date() -> str | None:
     """SOURCE_DATE_EPOCH as FMI has dates; without it there is no date, lest bytes differ."""
-    text = os.environ.get("SOURCE_DATE_EPOCH")
-    if not text:
-        return None
-    try:
-        return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(int(text)))
-    except (ValueError, OverflowError, OSError):
-        rule = "it must be seconds since 1970, a whole number"
-        raise InputError(f"SOURCE_DATE_EPOCH is {text!r}; {rule}") from None
+    when = packing.source_time()
+    return None if when is None else time.strftime("%Y-%m-%dT%H:%M:%SZ", when)

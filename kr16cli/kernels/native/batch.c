@@ -16,11 +16,10 @@
 /* Results of this many numbers (2 MiB) and more go past the caches. */
 #define STREAMED (1 << 18)
 
-
 int kr16_sincos_rows(const double *angles, double *rows, int count);
 
-/* A tile's rows of a group; beyond the batch its last configuration is repeated. `from` is where
- * whole tiles can be read with a block to spare, else `room` is filled. */
+/* A tile's rows of a group. The last tile is copied to `room`, where the batch's last configuration
+ * is repeated to the end: what follows reads whole blocks, a little beyond the rows. */
 static const double *whole_tile(const double *source, int count, int lanes, int last, double *room)
 {
     if (!last)
@@ -33,7 +32,7 @@ static const double *whole_tile(const double *source, int count, int lanes, int 
 
 KR16_CLONES_OF static void to_columns(const double *rows, int count, double *columns)
 {
-    if (count == 6)
+    if (count == 6) /* a constant, so that the blocks are unrolled */
         kr16_to_columns(rows, 6, columns);
     else
         kr16_to_columns(rows, count, columns);
