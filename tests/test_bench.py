@@ -13,9 +13,9 @@ from kr16cli.bench.timing import nanoseconds
 
 
 def test_time_of_a_call_is_of_its_size() -> None:
-    few = nanoseconds(lambda: sum(range(1000)), 1, 2)
-    many = nanoseconds(lambda: sum(range(100_000)), 1, 2)
-    assert 20 < many / few < 500
+    works = {str(n): (lambda n=n: sum(range(n)), n // 1000) for n in (1000, 100_000)}
+    each = nanoseconds(works, 3)
+    assert 0.2 < each["100000"] / each["1000"] < 5
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -38,14 +38,14 @@ def test_every_quantity_has_its_figures_and_peers() -> None:
 
 
 def test_missing_peers_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    def absent(*_: object) -> peers.Calls:
+    def absent(*_: object) -> peers.Works:
         raise ImportError
         yield
 
     for name in ("_pinocchio", "_mujoco", "_eaik", "_opw"):
         monkeypatch.setattr(peers, name, absent)
     robot = kr16cli.load_robot()
-    assert peers.measure(robot, own.inputs(robot, 10), 1) == {}
+    assert peers.works(robot, own.inputs(robot, 10)) == {}
 
 
 def test_command_prints_a_table_and_json() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kr16cli.api import Robot
-from kr16cli.bench.timing import nanoseconds
+from kr16cli.bench.timing import Work
 from kr16cli.kernels.quantities import QUANTITIES
 
 MEASURED = (
@@ -26,26 +26,18 @@ def inputs(robot: Robot, n: int, seed: int = 1) -> dict[str, Any]:
     return made
 
 
-def measure(robot: Robot, n: int, threads: int, rounds: int) -> list[dict[str, Any]]:
-    """One row per quantity: ns per configuration in a batch, with threads, and of one call."""
-    return [_row(robot, name, inputs(robot, n), threads, rounds) for name in MEASURED]
-
-
-def _row(
-    robot: Robot, name: str, made: Mapping[str, Any], threads: int, rounds: int
-) -> dict[str, Any]:
+def works(robot: Robot, name: str, made: Mapping[str, Any], threads: int) -> dict[str, Work]:
+    """A quantity in a batch, in a batch with threads, and in one call."""
     ask: Callable[..., Any] = getattr(robot, name)
     arguments = [made[i] for i in QUANTITIES[name].inputs if i in made]
     n = len(arguments[0])
     out = np.empty((n, *QUANTITIES[name].shape))
     one = [np.ascontiguousarray(a[0]) for a in arguments]
-    row: dict[str, Any] = {
-        "quantity": name,
-        "batch_ns": nanoseconds(lambda: ask(*arguments, out=out), n, rounds),
-        "threads_ns": nanoseconds(lambda: ask(*arguments, out=out, threads=threads), n, rounds),
-        "call_ns": nanoseconds(lambda: ask(*one), 1, rounds),
+    return {
+        "batch_ns": (lambda: ask(*arguments, out=out), n),
+        "threads_ns": (lambda: ask(*arguments, out=out, threads=threads), n),
+        "call_ns": (lambda: ask(*one), 1),
     }
-    return row
 
 
 def near_the_limit(rows: Sequence[dict[str, Any]], rounds: int) -> dict[str, float]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kr16cli.api import Robot
-from kr16cli.bench.timing import nanoseconds
+from kr16cli.bench.timing import Work
 from kr16cli.export.mjcf import mjcf
 from kr16cli.export.urdf import urdf
 
@@ -23,23 +23,22 @@ THREADS = 2
 """Of a peer's own parallel batch, compared with one thread of this library."""
 
 
-def measure(robot: Robot, made: Mapping[str, Any], rounds: int) -> dict[str, dict[str, Any]]:
-    """Quantity -> peer -> ns per configuration (a number), for peers that are here."""
-    table: dict[str, dict[str, Any]] = {}
+def works(robot: Robot, made: Mapping[str, Any]) -> dict[str, dict[str, Work]]:
+    """Quantity -> peer -> its call, for the peers that are here."""
+    table: dict[str, dict[str, Work]] = {}
     for peer in (_pinocchio, _mujoco, _eaik, _opw):
         try:
-            calls = dict(peer(robot, made))
+            for (quantity, label), work in peer(robot, made):
+                table.setdefault(quantity, {})[label] = work
         except ImportError:
             continue
-        for (quantity, label), (call, per) in calls.items():
-            table.setdefault(quantity, {})[label] = nanoseconds(call, per, rounds)
     return table
 
 
-Calls = Iterator[tuple[tuple[str, str], tuple[Callable[[], object], int]]]
+Works = Iterator[tuple[tuple[str, str], Work]]
 
 
-def _looped(function: Callable[..., object], *columns: Any) -> tuple[Callable[[], object], int]:
+def _looped(function: Callable[..., object], *columns: Any) -> Work:
     rows = list(zip(*(c[:_LOOP] for c in columns), strict=True))
 
     def call() -> None:
@@ -49,7 +48,7 @@ def _looped(function: Callable[..., object], *columns: Any) -> tuple[Callable[[]
     return call, len(rows)
 
 
-def _pinocchio(robot: Robot, made: Mapping[str, Any]) -> Calls:
+def _pinocchio(robot: Robot, made: Mapping[str, Any]) -> Works:
     import pinocchio as pin
 
     model = pin.buildModelFromXML(urdf(robot.data))
@@ -96,7 +95,7 @@ def _pinocchio(robot: Robot, made: Mapping[str, Any]) -> Calls:
         yield (name, label), (partial(call, THREADS, pool, *turned), len(q))
 
 
-def _mujoco(robot: Robot, made: Mapping[str, Any]) -> Calls:
+def _mujoco(robot: Robot, made: Mapping[str, Any]) -> Works:
     import mujoco
 
     model = mujoco.MjModel.from_xml_string(mjcf(robot.data))
@@ -115,7 +114,7 @@ def _mujoco(robot: Robot, made: Mapping[str, Any]) -> Calls:
     yield ("inverse_dynamics", "MuJoCo, a loop"), _looped(inverse, *states)
 
 
-def _eaik(robot: Robot, made: Mapping[str, Any]) -> Calls:
+def _eaik(robot: Robot, made: Mapping[str, Any]) -> Works:
     from eaik.IK_DH import DhRobot
 
     g = robot.data.geometry
@@ -129,7 +128,7 @@ def _eaik(robot: Robot, made: Mapping[str, Any]) -> Calls:
     yield ("ik", "EAIK, its batch"), (lambda: arm.IK_batched(poses), len(poses))
 
 
-def _opw(robot: Robot, made: Mapping[str, Any]) -> Calls:
+def _opw(robot: Robot, made: Mapping[str, Any]) -> Works:
     import py_opw_kinematics as opw
 
     g = robot.data.geometry

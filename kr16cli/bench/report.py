@@ -9,6 +9,7 @@ from typing import Any
 
 from kr16cli.api import Robot
 from kr16cli.bench import motion, own, peers, rollouts
+from kr16cli.bench.timing import Work, nanoseconds
 from kr16cli.kernels import engine_name
 
 SCHEMA = "kr16.bench/1"
@@ -23,14 +24,12 @@ def bench(robot: Robot, *, n: int, threads: int, rounds: int, with_peers: bool) 
 
     `call_ratio`: a call of Pinocchio over a call of this library.
     """
-    rows = own.measure(robot, n, threads, rounds)
-    others = peers.measure(robot, own.inputs(robot, n), rounds) if with_peers else {}
-    for row in rows:
-        found = others.get(row["quantity"], {})
-        row["peers"] = found
-        row["ratio"] = min(found.values()) / row["batch_ns"] if found else None
-        loop = found.get(peers.LOOP)
-        row["call_ratio"] = loop / row["call_ns"] if loop else None
+    made = own.inputs(robot, n)
+    others = peers.works(robot, made) if with_peers else {}
+    rows = [
+        _row(name, own.works(robot, name, made, threads), others.get(name, {}), rounds)
+        for name in own.MEASURED
+    ]
     figures = []
     if with_peers:
         figures = [*motion.measure(robot, rounds), *rollouts.measure(robot, rounds)]
@@ -50,6 +49,19 @@ def bench(robot: Robot, *, n: int, threads: int, rounds: int, with_peers: bool) 
         },
         "warnings": ["wall times of a shared machine drift; compare the ratios of one run"],
     }
+
+
+def _row(
+    name: str, works: Mapping[str, Work], others: Mapping[str, Work], rounds: int
+) -> dict[str, Any]:
+    """One quantity, here and by the peers, all taking turns."""
+    times = nanoseconds({**works, **others}, rounds)
+    row: dict[str, Any] = {"quantity": name, **{key: times[key] for key in works}}
+    row["peers"] = found = {peer: times[peer] for peer in others}
+    row["ratio"] = min(found.values()) / row["batch_ns"] if found else None
+    loop = found.get(peers.LOOP)
+    row["call_ratio"] = loop / row["call_ns"] if loop else None
+    return row
 
 
 def machine() -> dict[str, Any]:

@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 
 _LEAST = 0.02
 """Seconds a run should last, so that the clock's own cost does not count."""
 
 
-def nanoseconds(call: Callable[[], object], per: int, rounds: int) -> float:
-    """Nanoseconds per unit of a call that does `per` units; the best of `rounds`."""
+Work = tuple[Callable[[], object], int]
+"""A call, and how many units it does."""
+
+
+def nanoseconds(works: Mapping[str, Work], rounds: int) -> dict[str, float]:
+    """Nanoseconds per unit of each, the least of `rounds`; they take turns, as in `least`."""
+    repeats = {name: _repeats(call) for name, (call, _) in works.items()}
+    spent = least({name: partial(_run, works[name][0], repeats[name]) for name in works}, rounds)
+    return {name: spent[name] / repeats[name] / per * 1e9 for name, (_, per) in works.items()}
+
+
+def _repeats(call: Callable[[], object]) -> int:
+    """How often to call, to last long enough."""
     repeat = 1
-    while True:
-        spent = _run(call, repeat)
-        if spent >= _LEAST:
-            break
+    while (spent := _run(call, repeat)) < _LEAST:
         repeat *= 2 if spent <= 0.0 else max(2, int(_LEAST / spent) + 1)
-    best = min(spent, *(_run(call, repeat) for _ in range(rounds)))
-    return best / repeat / per * 1e9
+    return repeat
 
 
 def _run(call: Callable[[], object], repeat: int) -> float:

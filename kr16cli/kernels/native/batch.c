@@ -57,6 +57,16 @@ static void far_trig_rows(const double *angles, int count, double *rows)
     }
 }
 
+/* Ask for numbers that the next tile reads, spread over this tile's work: all at once they would
+ * fill the queue to memory and stall it. */
+static void fetch(const double *from, ptrdiff_t count)
+{
+#ifdef __GNUC__
+    for (ptrdiff_t at = 0; at < count; at += 8)
+        __builtin_prefetch(from + at);
+#endif
+}
+
 static int load(const kr16_kernel *k, const double *const *inputs, ptrdiff_t lo, int lanes,
                 int last, double *x)
 {
@@ -72,6 +82,8 @@ static int load(const kr16_kernel *k, const double *const *inputs, ptrdiff_t lo,
         } else {
             const double *rows = whole_tile(inputs[g] + lo * count, count, lanes, last, room);
             to_columns(rows, count, trig ? angles : x);
+            if (!last)
+                fetch(rows + LANES * count, LANES * count);
             if (trig ? kr16_sincos_rows(angles, x, count) : not_finite(x, count * LANES)) {
                 if (!trig || not_finite(angles, count * LANES))
                     return KR16_BAD_INPUT;
