@@ -106,6 +106,10 @@ class Robot(Kinematics):
         for name, required in {**direct, **(DYNAMIC_METHODS if self.data.links else {})}.items():
             setattr(self, name, kernels.method(name, required, getattr(self, name)))
 
+    def compiled(self, *names: str) -> tuple[Any, ...] | None:
+        """The compiled kernels of these quantities, tool left out, or None without an extension."""
+        return None if self._native is None else tuple(self._native[name] for name in names)
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled by what it was made of; the kernels are bound anew."""
         return _remade, (self.data, self.payload, self.drives, self.tool)

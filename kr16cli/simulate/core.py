@@ -19,7 +19,8 @@ class Torque(Protocol):
     """What drives the joints.
 
     `breaks` are the times (s, rising) at which the torque is not smooth; the solver starts
-    afresh there, so that no step of it spans a kink.
+    afresh there, so that no step of it spans a kink. A torque that keeps still between breaks
+    may say so by an attribute `steady` that is true: compiled solvers can then serve it.
     """
 
     @property

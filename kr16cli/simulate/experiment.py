@@ -10,6 +10,7 @@ from kr16cli.api import Robot
 from kr16cli.arrays import Array
 from kr16cli.robot import RobotData
 from kr16cli.simulate.build import make_drive
+from kr16cli.simulate.compiled import CompiledSolver
 from kr16cli.simulate.core import Reference, Torque
 from kr16cli.simulate.events import Event, LimitWatch, TargetWatch, Watch, Watches
 from kr16cli.simulate.fast import quickest_arm
@@ -57,14 +58,16 @@ def simulate(
         end = reference.duration
         watches.append(TargetWatch(end, reference.joint(end).q))
     stops = scenario.limits.joint == "stop"
+    solver, weights = scenario.solver_used(), np.array([1.0] * 12 + [WORK_TOLERANCE] * WORKS)
     integration = Integration(
         plant,
-        scenario.solver_used(),
-        np.array([1.0] * 12 + [WORK_TOLERANCE] * WORKS),
+        solver,
+        weights,
         Watches(watches),
         on_step,
         on_break=_sampler(drive),
         ends=lambda event: stops and event.kind.startswith(("leave", "outside")),
+        quick=CompiledSolver(robot, plant, solver, solver.atol * weights).stepper,
     )
     start = np.array([*scenario.q, *scenario.qd, *(0.0,) * WORKS])
     times = sample_times(scenario.duration, scenario.output_step)

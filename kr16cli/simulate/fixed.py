@@ -17,6 +17,11 @@ STEPS: dict[str, Callable[[Rates, float, Sequence[float], float], list[float]]] 
 }
 
 
+def equal_parts(length: float, step: float) -> int:
+    """Into how many equal steps a stretch falls, none longer than `step`."""
+    return max(1, math.ceil(length / step * (1.0 - 1e-12)))
+
+
 class FixedStepper:
     """Steps of one length from t to `stop`, both exactly.
 
@@ -34,7 +39,7 @@ class FixedStepper:
     ) -> None:
         self._method, self._rates = STEPS[method], rates
         self._begin, self._stop = t, stop
-        self._count = max(1, math.ceil((stop - t) / step * (1.0 - 1e-12)))
+        self._count = equal_parts(stop - t, step)
         self._done = 0
         self._last: tuple[float, tuple[float, ...], list[float]] | None = None
         self.t, self.y, self.t_old = t, y, t

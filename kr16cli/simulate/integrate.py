@@ -71,6 +71,7 @@ class Integration:
         on_step: told the time (s) after each step.
         on_break: told time and state at the start and at each break.
         ends: whether an event ends the integration.
+        quick: a quicker solver's stepper from a state at a time (s) to another, if it has one.
     """
 
     def __init__(
@@ -83,7 +84,9 @@ class Integration:
         *,
         on_break: Callable[[float, Array], None] = lambda t, y: None,
         ends: Callable[[Event], bool] = lambda event: False,
+        quick: Callable[[float, Array, float], Any] = lambda t, y, stop: None,
     ) -> None:
+        self._quick = quick
         self._system, self._solver, self._watch, self._on_step = system, solver, watch, on_step
         self._on_break, self._ends = on_break, ends
         self._atol = solver.atol * weights
@@ -136,6 +139,9 @@ class Integration:
 
     def _stepper(self, t: float, y: Array, stop: float) -> Any:
         """A solver from t to stop; at stop it sees what the system was until then."""
+        quick = self._quick(t, y, stop)
+        if quick is not None:
+            return quick
         spec, before = self._solver, float(np.nextafter(stop, 0.0))
 
         def rates(time: float, state: Any) -> list[float]:

@@ -53,6 +53,8 @@ class SampledLoop:
         duration: until when it is sampled, s.
     """
 
+    steady = True
+
     def __init__(
         self, controller: Controller, reference: Reference, sampling: Sampling, duration: float
     ) -> None:

@@ -128,10 +128,23 @@ class Plant:
     def _push(self, depth: float, speed: float, k: float) -> float:
         return max(0.0, k * depth * (1.0 + self.limits.bounce * speed)) if depth > 0.0 else 0.0
 
-    def external(self, t: float, q: Sequence[float]) -> list[float]:
-        """J^T w: joint torques (N m) of the wrench at time t (s)."""
+    @property
+    def holds(self) -> bool:
+        """Whether all that acts on the arm, gravity aside, keeps still between breaks."""
+        steady = getattr(self.torque, "steady", False)
+        return steady and not (self._stops or self.arm.drives or self.limits.speed)
+
+    def pushing(self, t: float) -> Wrench | None:
+        """The external wrench, if it acts at time t (s)."""
         w = self.wrench
         if w is None or t < w.start or (w.end is not None and t >= w.end):
+            return None
+        return w
+
+    def external(self, t: float, q: Sequence[float]) -> list[float]:
+        """J^T w: joint torques (N m) of the wrench at time t (s)."""
+        w = self.pushing(t)
+        if w is None:
             return list(_NOTHING)
         rows = self.arm.jacobian(q, axes=w.axes)
         load = (*w.force, *w.moment)

@@ -22,6 +22,7 @@ _COLUMNS = tuple(f"tau{i}" for i in range(1, 7))
 class Constant:
     """The same torques all the time."""
 
+    steady = True
     breaks: Sequence[float] = ()
 
     def __init__(self, tau: Sequence[float] = (0.0,) * 6) -> None:

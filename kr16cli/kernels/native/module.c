@@ -134,6 +134,17 @@ int kr16_kernel_groups(PyObject *kernel)
     return ((Kernel *)kernel)->groups;
 }
 
+int kr16_kernel_width(PyObject *kernel)
+{
+    return kr16_batch_kernels[((Kernel *)kernel)->kernel].width;
+}
+
+int kr16_kernel_one(PyObject *kernel, const double *const *inputs, double *out)
+{
+    const Kernel *k = (const Kernel *)kernel;
+    return kr16_run_one(k->kernel, k->parameters, inputs, out);
+}
+
 static int find_kernel(const char *name)
 {
     for (int i = 0; kr16_batch_kernels[i].name != NULL; i++)
@@ -359,7 +370,8 @@ PyMODINIT_FUNC PyInit__native(void)
         return NULL;
     PyObject *m = PyModule_Create(&module);
     if (m != NULL && (PyModule_AddObjectRef(m, "Kernel", (PyObject *)&KernelType) < 0 ||
-                      kr16_add_method_type(m) < 0 || kr16_add_rollout(m) < 0))
+                      kr16_add_method_type(m) < 0 || kr16_add_rollout(m) < 0 ||
+                      kr16_add_stretch_type(m) < 0))
         Py_CLEAR(m);
     return m;
 }
