@@ -22,24 +22,32 @@ static inline double kr16_flip(double v, uint64_t sign)
     return v;
 }
 
+/* The parts of kr16_sincos, for a number or a vector of them. Quarter turns to the nearest, by
+ * adding 1.5 * 2^52; pi/2 in three parts of 33 bits (Cody and Waite), whose products with the
+ * count are exact. */
+#define KR16_SHIFT 6755399441055744.0
+#define KR16_SHIFTED(x) ((x) * 6.36619772367581382433e-01 + KR16_SHIFT)
+#define KR16_REDUCED(x, turns)                                                                     \
+    ((((x) - (turns) * 1.57079632673412561417e+00) - (turns) * 6.07710050630396597660e-11) -       \
+     (turns) * 2.02226624879595063154e-21)
+#define KR16_SINE(r, z)                                                                            \
+    ((r) + (r) * (z) *                                                                             \
+        (-1.66666666666666324348e-01 + (z) * (8.33333333332248946124e-03 +                         \
+        (z) * (-1.98412698298579493134e-04 + (z) * (2.75573137070700676789e-06 +                   \
+        (z) * (-2.50507602534068634195e-08 + (z) * 1.58969099521155010221e-10))))))
+#define KR16_COSINE(z)                                                                             \
+    (1.0 + (z) * (-0.5 + (z) *                                                                     \
+        (4.16666666666666019037e-02 + (z) * (-1.38888888888741095749e-03 +                         \
+        (z) * (2.48015872894767294178e-05 + (z) * (-2.75573143513906633035e-07 +                   \
+        (z) * (2.08757232129817482790e-09 + (z) * -1.13596475577881948265e-11)))))))
+
 static inline void kr16_sincos(double x, double *sine, double *cosine)
 {
-    /* Quarter turns to the nearest, by adding 1.5 * 2^52; pi/2 in three parts of 33 bits
-     * (Cody and Waite), whose products with the count are exact. */
-    const double shifted = x * 6.36619772367581382433e-01 + 6755399441055744.0;
-    const double turns = shifted - 6755399441055744.0;
-    double r = x - turns * 1.57079632673412561417e+00;
-    r = r - turns * 6.07710050630396597660e-11;
-    r = r - turns * 2.02226624879595063154e-21;
+    const double shifted = KR16_SHIFTED(x);
+    const double turns = shifted - KR16_SHIFT;
+    const double r = KR16_REDUCED(x, turns);
     const double z = r * r;
-    const double s = r + r * z *
-        (-1.66666666666666324348e-01 + z * (8.33333333332248946124e-03 +
-        z * (-1.98412698298579493134e-04 + z * (2.75573137070700676789e-06 +
-        z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
-    const double c = 1.0 + z * (-0.5 + z *
-        (4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03 +
-        z * (2.48015872894767294178e-05 + z * (-2.75573143513906633035e-07 +
-        z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))))));
+    const double s = KR16_SINE(r, z), c = KR16_COSINE(z);
     uint64_t k;
     memcpy(&k, &shifted, sizeof k);
     /* An odd quarter turn swaps the two; the second bit, of k and of k + 1, is the sign. */
@@ -69,6 +77,15 @@ static inline double kr16_atan2(double y, double x)
     a = ay > ax ? 1.57079632679489655800e+00 - (a - 6.12323399573676603587e-17) : a;
     a = x < 0.0 ? 3.14159265358979311600e+00 - (a - 1.22464679914735317723e-16) : a;
     return copysign(a, y);
+}
+
+/* Several at once: a count that the compiler knows becomes vectors. */
+static inline __attribute__((always_inline, unused)) void
+kr16_atan2_all(int count, const double *y, const double *x, double *angle)
+{
+#pragma omp simd
+    for (int i = 0; i < count; i++)
+        angle[i] = kr16_atan2(y[i], x[i]);
 }
 
 #endif
