@@ -3,9 +3,10 @@
  * One step at a time, for a simulation that looks at each: events, samples, a controller's turn.
  * The rates are those of kr16cli/simulate/plant.py without friction, stops and limits of speed.
  */
+#include "module.h"
+
 #include <math.h>
 
-#include "module.h"
 #include "ode.h"
 
 enum { ANGLES = 6, MOTION = 12, STATES = 16 };
