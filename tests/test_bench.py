@@ -42,7 +42,7 @@ def test_missing_peers_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
         raise ImportError
         yield
 
-    for name in ("_pinocchio", "_mujoco", "_eaik", "_opw"):
+    for name in ("_pinocchio", "_mujoco", "_toolbox", "_eaik", "_opw"):
         monkeypatch.setattr(peers, name, absent)
     robot = kr16cli.load_robot()
     assert peers.works(robot, own.inputs(robot, 10)) == {}

@@ -26,7 +26,7 @@ THREADS = 2
 def works(robot: Robot, made: Mapping[str, Any]) -> dict[str, dict[str, Work]]:
     """Quantity -> peer -> its call, for the peers that are here."""
     table: dict[str, dict[str, Work]] = {}
-    for peer in (_pinocchio, _mujoco, _eaik, _opw):
+    for peer in (_pinocchio, _mujoco, _toolbox, _eaik, _opw):
         try:
             for (quantity, label), work in peer(robot, made):
                 table.setdefault(quantity, {})[label] = work
@@ -112,6 +112,17 @@ def _mujoco(robot: Robot, made: Mapping[str, Any]) -> Works:
     yield ("fk", "MuJoCo, a loop"), _looped(fk, made["q"])
     states = (made["q"], made["qd"], made["qdd"])
     yield ("inverse_dynamics", "MuJoCo, a loop"), _looped(inverse, *states)
+
+
+def _toolbox(robot: Robot, made: Mapping[str, Any]) -> Works:
+    from kr16cli.verify.engines.toolbox import build
+
+    arm = build(robot.data, robot.payload).robot
+    q, qd, qdd = (made[k][: _LOOP // 10] for k in ("q", "qd", "qdd"))  # it takes its time
+    label = "Robotics Toolbox"
+    yield ("fk", f"{label}, its batch"), (lambda: arm.fkine(q), len(q))
+    yield ("jacobian", f"{label}, a loop"), _looped(arm.jacob0, q)
+    yield ("inverse_dynamics", f"{label}, its batch"), (lambda: arm.rne(q, qd, qdd), len(q))
 
 
 def _eaik(robot: Robot, made: Mapping[str, Any]) -> Works:
