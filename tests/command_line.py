@@ -1,9 +1,10 @@
-"""Run `kr16` in this process, as quickly as a function call."""
+"""Run `kr16` in this process, as quickly as a function call, or in one of its own."""
 
 from __future__ import annotations
 
 import io
 import json
+import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from typing import Any, NamedTuple
@@ -51,6 +52,13 @@ def kr16(*arguments: object, stdin: str | bytes = "") -> Outcome:
     finally:
         sys.stdin = before
     return Outcome(code, out.getvalue(), err.getvalue())
+
+
+def kr16_process(*words: str, **options: object) -> subprocess.CompletedProcess[str]:
+    """Run the command line in a process of its own; options go to `subprocess.run`."""
+    command = [sys.executable, "-m", "kr16cli", *words]
+    settings: dict[str, object] = {"capture_output": True, "text": True, "timeout": 60}
+    return subprocess.run(command, check=False, **(settings | options))  # type: ignore[call-overload,no-any-return]
 
 
 def complains(outcome: Outcome, *words: str, code: int = 2) -> None:

@@ -1,4 +1,4 @@
-"""Hypothesis profiles and the robots that most tests share."""
+"""Hypothesis profiles, and the robots and engines that most tests share."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import hypothesis
 import pytest
 
 import kr16cli
+from kernel_cases import native
 
 # No deadline: times belong to the benchmarks, and a shared machine stalls at random.
 # The gate draws the same examples every time; `--hypothesis-profile=full` explores.
@@ -30,3 +31,10 @@ def arm(data: kr16cli.RobotData) -> kr16cli.Arm:
 def robot() -> kr16cli.Robot:
     """The KR 16-2 on arrays: rigid, without payload."""
     return kr16cli.load_robot()
+
+
+@pytest.fixture(params=["numpy", pytest.param("native", marks=native)])
+def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Each engine in turn, forced by the environment."""
+    monkeypatch.setenv("KR16_ENGINE", request.param)
+    return str(request.param)

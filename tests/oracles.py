@@ -12,93 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from numbers import Number
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[Any]
+from duals import Array, Dual, dual_turns, eps, real
 
 AXES = np.array([[0, 0, -1], [0, 1, 0], [0, 1, 0], [-1, 0, 0], [0, 1, 0], [-1, 0, 0]])
 """Joint axes A1 to A6 at the zero pose, robroot; positive turns are KUKA's."""
-
-
-class Dual:
-    """a + b eps with eps^2 = 0: exact derivatives of anything made of + - * /."""
-
-    __slots__ = ("eps", "real")
-
-    def __init__(self, real: Any, eps: Any = 0) -> None:
-        self.real, self.eps = real, eps
-
-    @staticmethod
-    def _parts(other: Any) -> tuple[Any, Any] | None:
-        if isinstance(other, Dual):
-            return other.real, other.eps
-        return (other, 0) if isinstance(other, Number) else None
-
-    def __add__(self, other: Any) -> Dual:
-        parts = self._parts(other)
-        if parts is None:
-            return NotImplemented
-        return Dual(self.real + parts[0], self.eps + parts[1])
-
-    __radd__ = __add__
-
-    def __neg__(self) -> Dual:
-        return Dual(-self.real, -self.eps)
-
-    def __sub__(self, other: Any) -> Dual:
-        parts = self._parts(other)
-        if parts is None:
-            return NotImplemented
-        return Dual(self.real - parts[0], self.eps - parts[1])
-
-    def __rsub__(self, other: Any) -> Dual:
-        return -self + other
-
-    def __mul__(self, other: Any) -> Dual:
-        parts = self._parts(other)
-        if parts is None:
-            return NotImplemented
-        return Dual(self.real * parts[0], self.real * parts[1] + self.eps * parts[0])
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Any) -> Dual:
-        parts = self._parts(other)
-        if parts is None:
-            return NotImplemented
-        value = self.real / parts[0]
-        return Dual(value, (self.eps - value * parts[1]) / parts[0])
-
-    def __rtruediv__(self, other: Any) -> Dual:
-        return Dual(other) / self
-
-
-def real(values: Any) -> Array:
-    """The real parts of an array of dual numbers (others are their own)."""
-    return _each(values, lambda v: v.real if isinstance(v, Dual) else v)
-
-
-def eps(values: Any) -> Array:
-    """The dual parts: the derivative along the direction that was seeded."""
-    return _each(values, lambda v: v.eps if isinstance(v, Dual) else 0)
-
-
-def _each(values: Any, what: Any) -> Array:
-    array = np.asarray(values, dtype=object)
-    flat = np.array([what(v) for v in array.ravel()] + [None], dtype=object)[:-1]
-    return flat.reshape(array.shape)
-
-
-def dual_turns(c: Array, s: Array, direction: Sequence[Any]) -> tuple[Array, Array]:
-    """(cos, sin) arrays that carry the derivative along a joint-space direction."""
-    triples = list(zip(c, s, direction, strict=True))
-    cosines = [Dual(ci, -si * v) for ci, si, v in triples]
-    sines = [Dual(si, ci * v) for ci, si, v in triples]
-    return np.array(cosines, dtype=object), np.array(sines, dtype=object)
 
 
 def turns(q: npt.ArrayLike) -> tuple[Array, Array]:
@@ -454,88 +376,3 @@ def roots(g: Any, pose: Array, starts: Array, steps: int = 60) -> Array:
         if all(angle_gap(row, other) > 1e-6 for other in found):
             found.append(row)
     return np.array(found).reshape(-1, 6)
-
-
-class Pinocchio:
-    """Pinocchio's model of the same numbers, built link by link at the zero pose.
-
-    Args:
-        g: geometry. links: from `bodies`. field: gravity vector, robroot, m/s2.
-    """
-
-    def __init__(self, g: Any, links: Sequence[Body], field: Sequence[float]) -> None:
-        import pinocchio as pin
-
-        self.pin = pin
-        self.model = pin.Model()
-        parent, last = 0, np.zeros(3)
-        for i, (axis, point, body) in enumerate(zip(AXES, points(g), links, strict=True)):
-            place = pin.SE3(np.eye(3), point - last)
-            joint = pin.JointModelRevoluteUnaligned(axis.astype(float))
-            parent = self.model.addJoint(parent, joint, place, f"A{i + 1}")
-            inertia = pin.Inertia(body.mass, body.centre - point, body.inertia)
-            self.model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
-            last = point
-        zero = zero_flange(g)
-        zero[:3, 3] -= last
-        frame = pin.Frame("flange", parent, 0, pin.SE3(zero), pin.FrameType.OP_FRAME)
-        self.flange = self.model.addFrame(frame)
-        self.model.gravity.linear = np.array(field, dtype=float)
-        self.data = self.model.createData()
-
-    def fk(self, q: Array) -> Array:
-        """T_robroot_flange."""
-        self.pin.framesForwardKinematics(self.model, self.data, q)
-        return np.array(self.data.oMf[self.flange].homogeneous)
-
-    def jacobian(self, q: Array) -> Array:
-        """Flange Jacobian in robroot axes."""
-        axes = self.pin.LOCAL_WORLD_ALIGNED
-        return np.array(self.pin.computeFrameJacobian(self.model, self.data, q, self.flange, axes))
-
-    def jacobian_dot(self, q: Array, qd: Array) -> Array:
-        """Its rate."""
-        self.pin.computeJointJacobiansTimeVariation(self.model, self.data, q, qd)
-        self.pin.updateFramePlacements(self.model, self.data)
-        axes = self.pin.LOCAL_WORLD_ALIGNED
-        return np.array(
-            self.pin.getFrameJacobianTimeVariation(self.model, self.data, self.flange, axes)
-        )
-
-    def mass_matrix(self, q: Array) -> Array:
-        """M by composite bodies."""
-        upper = np.triu(self.pin.crba(self.model, self.data, q))
-        return upper + np.triu(upper, 1).T
-
-    def coriolis_matrix(self, q: Array, qd: Array) -> Array:
-        """C of Pinocchio's own factorisation."""
-        return np.array(self.pin.computeCoriolisMatrix(self.model, self.data, q, qd))
-
-    def gravity(self, q: Array) -> Array:
-        """G."""
-        return np.array(self.pin.computeGeneralizedGravity(self.model, self.data, q))
-
-    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Newton-Euler."""
-        return np.array(self.pin.rnea(self.model, self.data, q, qd, qdd))
-
-    def forward_dynamics(self, q: Array, qd: Array, tau: Array) -> Array:
-        """Articulated bodies."""
-        return np.array(self.pin.aba(self.model, self.data, q, qd, tau))
-
-    def energy(self, q: Array, qd: Array) -> tuple[float, float]:
-        """(kinetic, potential)."""
-        kinetic = self.pin.computeKineticEnergy(self.model, self.data, q, qd)
-        return float(kinetic), float(self.pin.computePotentialEnergy(self.model, self.data, q))
-
-    def base_wrench(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Force and moment about robroot's origin, from the rate of the centroidal momentum."""
-        pin = self.pin
-        rate = pin.computeCentroidalMomentumTimeVariation(self.model, self.data, q, qd, qdd)
-        mass, centre = pin.computeTotalMass(self.model), np.array(self.data.com[0])
-        force = rate.linear - mass * self.model.gravity.linear
-        return np.concatenate([force, rate.angular + np.cross(centre, force)])
-
-    def regressor(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """6 x 60: torques per inertial parameter."""
-        return np.array(self.pin.computeJointTorqueRegressor(self.model, self.data, q, qd, qdd))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import random
 from pathlib import Path
@@ -13,30 +11,21 @@ import numpy as np
 import pytest
 
 from command_line import complains, kr16
+from joint_tables import HEADER, WIDE, csv_of, rows_of
 from kr16cli.assets import asset
 
-_WIDE = ((-185, 185), (-155, 35), (-130, 154), (-350, 350), (-130, 130), (-350, 350))
-_HEADER = "a1,a2,a3,a4,a5,a6"
-_GOOD = f"{_HEADER}\n0,-90,90,0,0,0\n10,20,-30,40,50,60\n"
-_BAD = f"{_HEADER}\n0,-90,90,0,0,0\n1,2,x,4,5,6\n10,20,-30,40,50,60\n1,2,3,4,5,\n"
-
-
-def _rows(text: str) -> list[dict[str, str]]:
-    return list(csv.DictReader(io.StringIO(text)))
+_GOOD = f"{HEADER}\n0,-90,90,0,0,0\n10,20,-30,40,50,60\n"
+_BAD = f"{HEADER}\n0,-90,90,0,0,0\n1,2,x,4,5,6\n10,20,-30,40,50,60\n1,2,3,4,5,\n"
 
 
 def _random_joints(count: int) -> list[list[float]]:
     draw = random.Random(7)
-    return [[draw.uniform(lo, hi) for lo, hi in _WIDE] for _ in range(count)]
-
-
-def _csv(rows: list[list[float]], header: str = _HEADER) -> str:
-    return "\n".join([header, *(",".join(map(repr, row)) for row in rows)]) + "\n"
+    return [[draw.uniform(lo, hi) for lo, hi in WIDE] for _ in range(count)]
 
 
 def test_a_thousand_poses_through_ik(tmp_path: Path) -> None:
     joints = tmp_path / "joints.csv"
-    joints.write_text(_csv(_random_joints(1000)))
+    joints.write_text(csv_of(_random_joints(1000)))
     poses = tmp_path / "poses.csv"
     assert kr16("fk", "--input", joints, "-o", poses).code == 0
     done = kr16("ik", "--input", poses, "--json")
@@ -49,9 +38,9 @@ def test_a_thousand_poses_through_ik(tmp_path: Path) -> None:
 
 def test_batch_is_the_loop() -> None:
     joints = _random_joints(20)
-    rows = kr16("fk -", stdin=_csv(joints)).code
+    rows = kr16("fk -", stdin=csv_of(joints)).code
     assert rows == 0
-    batch = kr16("fk", "-", "--json", stdin=_csv(joints)).json()["result"]["rows"]
+    batch = kr16("fk", "-", "--json", stdin=csv_of(joints)).json()["result"]["rows"]
     for q, row in zip(joints, batch, strict=True):
         single = kr16("fk", *q, "--json").result()
         assert {k: v for k, v in row.items() if k not in ("status", "reason")} == single
@@ -108,7 +97,7 @@ def test_columns_not_used_are_named() -> None:
 def test_bad_rows_are_told_and_good_rows_written() -> None:
     done = kr16("fk", "-", "--format", "csv", stdin=_BAD)
     assert done.code == 1
-    rows = _rows(done.out)
+    rows = rows_of(done.out)
     assert [row["status"] for row in rows] == ["ok", "bad", "ok", "bad"]
     assert rows[1]["x"] == rows[3]["x"] == ""
     assert float(rows[0]["x"]) == 1088
@@ -121,14 +110,14 @@ def test_bad_rows_are_told_and_good_rows_written() -> None:
 
 @pytest.mark.parametrize("cell", ["nan", "inf", "-Infinity", "1e999", "1_0", "0x10", "1,0", " "])
 def test_a_cell_that_is_no_finite_number_spoils_its_row_only(cell: str) -> None:
-    text = f'{_HEADER}\n0,-90,90,0,0,0\n1,2,3,4,5,"{cell}"\n'
+    text = f'{HEADER}\n0,-90,90,0,0,0\n1,2,3,4,5,"{cell}"\n'
     done = kr16("fk", "-", "--json", stdin=text)
     assert done.code == 1
     assert [row["status"] for row in done.json()["result"]["rows"]] == ["ok", "bad"]
 
 
 def test_too_many_and_too_few_cells() -> None:
-    text = f"{_HEADER}\n1,2,3,4,5,6,7\n1,2,3\n1,2,3,4,5,6\n"
+    text = f"{HEADER}\n1,2,3,4,5,6,7\n1,2,3\n1,2,3,4,5,6\n"
     rows = kr16("fk", "-", "--json", stdin=text).json()["result"]["rows"]
     assert [row["status"] for row in rows] == ["bad", "bad", "ok"]
     assert "7 cells where the header has 6" in rows[0]["reason"]
@@ -142,13 +131,13 @@ def test_strict_writes_nothing(tmp_path: Path) -> None:
     assert out.read_text() == "before"
     assert list(tmp_path.iterdir()) == [out]
     assert kr16("fk", "-", "--strict", "-o", out, stdin=_GOOD).code == 0
-    assert len(_rows(out.read_text())) == 2
+    assert len(rows_of(out.read_text())) == 2
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", ("stdin", "empty", _HEADER)),
+        ("", ("stdin", "empty", HEADER)),
         ("\n\n", ("stdin", "empty")),
         ("0,-90,90,0,0,0\n", ("stdin", "header lacks a1")),
         ("a1,a2,a3,a4,a5\n", ("lacks a6",)),
@@ -163,7 +152,7 @@ def test_unusable_files_are_refused(text: str | bytes, words: tuple[str, ...]) -
 
 
 def test_a_header_alone_has_no_rows() -> None:
-    done = kr16("fk", "-", "--json", stdin=_HEADER + "\n")
+    done = kr16("fk", "-", "--json", stdin=HEADER + "\n")
     assert done.code == 0
     assert done.json()["result"] == {"rows": []}
 
@@ -241,20 +230,20 @@ def test_a_matrix_that_is_no_rotation_is_a_bad_row(tmp_path: Path) -> None:
 def test_track_follows_the_solution_before() -> None:
     """A4 turns past 180 deg; only --track keeps on turning."""
     joints = [[0.0, -90.0, 90.0, float(a4), 40.0, 0.0] for a4 in range(150, 260, 10)]
-    poses = kr16("fk", "-", "--format", "csv", stdin=_csv(joints)).out
+    poses = kr16("fk", "-", "--format", "csv", stdin=csv_of(joints)).out
     near = ("--near", *joints[0])
 
     def a4(*options: object) -> list[float]:
         done = kr16("ik", "-", *options, "--format", "csv", stdin=poses)
         assert done.code == 0
-        return [float(row["a4"]) for row in _rows(done.out)]
+        return [float(row["a4"]) for row in rows_of(done.out)]
 
     assert a4(*near, "--track") == pytest.approx([row[3] for row in joints])
     assert max(a4()) < 180.0001
 
 
 def test_speeds_and_torques_of_the_rows_come_first() -> None:
-    names = ",".join([_HEADER, *(f"qd{i}" for i in range(1, 7))])
+    names = ",".join([HEADER, *(f"qd{i}" for i in range(1, 7))])
     text = f"{names}\n0,-60,90,0,30,0,10,20,30,40,50,60\n"
     row = kr16("dynamics", "-", "--json", "--qd", 9, 9, 9, 9, 9, 9, stdin=text).json()
     single = kr16("dynamics 0 -60 90 0 30 0 --qd 10 20 30 40 50 60 --json").result()
@@ -265,14 +254,14 @@ def test_speeds_and_torques_of_the_rows_come_first() -> None:
 def test_matrices_in_csv_have_a_column_each(command: str) -> None:
     done = kr16(command, "-", "--format", "csv", stdin=_GOOD)
     assert done.code == 0
-    first, _ = _rows(done.out)
+    first, _ = rows_of(done.out)
     single = kr16(command, 0, -90, 90, 0, 0, 0, "--json").result()
     name, key = ("j_45", "jacobian") if command == "jacobian" else ("m_45", "mass_matrix")
     assert float(first[name]) == single[key][3][4]
 
 
 def test_warnings_of_many_rows_are_gathered() -> None:
-    text = _csv([[0.0, 40.0, 0.0, 0.0, 5.0, 0.0]] * 5)
+    text = csv_of([[0.0, 40.0, 0.0, 0.0, 5.0, 0.0]] * 5)
     (line,) = kr16("fk", "-", stdin=text).err.splitlines()
     assert "rows 1, 2, 3 and 2 more: A2 is 40 deg" in line
 
@@ -293,133 +282,3 @@ def test_tabs_alone_are_a_blank_line_but_commas_alone_are_a_row() -> None:
     assert len(kr16("fk", "-", "--json", stdin=tabs).json()["result"]["rows"]) == 2
     done = kr16("fk", "-", "--json", stdin=f"{_GOOD},,,,,\n")
     assert [row["status"] for row in done.json()["result"]["rows"]] == ["ok", "ok", "bad"]
-
-
-# Units that a file says ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("suffix", ["csv", "npz"])
-@pytest.mark.parametrize("si", [(), ("--si",)])
-def test_joint_angles_of_ik_are_read_in_their_own_units_only(
-    tmp_path: Path, suffix: str, si: tuple[str, ...]
-) -> None:
-    file = tmp_path / f"q.{suffix}"
-    pose = (1.2, 0.1, 0.9, 0, 2, 0) if si else (1200, 100, 900, 0, 120, 0)
-    assert kr16("ik", *pose, *si, "-o", file).code == 0
-    other = () if si else ("--si",)
-    do = "give --si" if si else "leave out --si"
-    complains(kr16("fk", "--input", file, *other, "--json"), str(file), "rad" if si else "deg", do)
-    (row,) = kr16("fk", "--input", file, *si, "--json").json()["result"]["rows"]
-    assert [row["pose"][k] for k in "xyz"] == pytest.approx(pose[:3])
-
-
-def test_poses_of_fk_are_read_in_their_own_units_only(tmp_path: Path) -> None:
-    file = tmp_path / "poses.csv"
-    assert kr16("fk", "-", "--si", "-o", file, stdin=f"{_HEADER}\n0,-1,1,0,0.5,0\n").code == 0
-    complains(kr16("ik", "--input", file, "--json"), str(file), "m rad", "give --si")
-    assert kr16("ik", "--input", file, "--si", "--json").code == 0
-    # Transforms are in m whatever was typed, so npz is read with and without.
-    archive = tmp_path / "poses.npz"
-    assert kr16("fk", 0, -1, 1, 0, 0.5, 0, "--si", "-o", archive).code == 0
-    deg = kr16("ik", "--input", archive, "--json").json()["result"]["rows"][0]["solutions"][0]
-    rad = kr16("ik", "--input", archive, "--si", "--json").json()["result"]["rows"][0]
-    assert np.radians(deg["q"]) == pytest.approx(rad["solutions"][0]["q"])
-
-
-def test_a_run_is_read_in_rad_only(tmp_path: Path) -> None:
-    table, archive = tmp_path / "run.csv", tmp_path / "run.npz"
-    words = "simulate --q 0 -60 60 10 30 20 --duration 0.02"
-    for file in (table, archive):
-        assert kr16(*words.split(), "-o", file).code == 0
-        complains(kr16("dynamics", "--input", file, "--json"), str(file), "rad", "give --si")
-    one = kr16("dynamics", "--input", table, "--si", "--json")
-    two = kr16("dynamics", "--input", archive, "--si", "--json")
-    assert (one.code, one.json()["warnings"]) == (0, [])
-    assert one.json()["result"] == two.json()["result"]
-    first = kr16("dynamics 0 -60 60 10 30 20 --json").result()
-    assert one.json()["result"]["rows"][0]["gravity"] == pytest.approx(first["gravity"])
-    complains(kr16("ik", "--input", table), "give --si")
-
-
-@pytest.mark.parametrize(
-    ("text", "si", "words"),
-    [
-        ("a1,a2,a3,a4,a5,a6,units\n1,2,3,4,5,6,deg\n1,2,3,4,5,6,rad\n", False, ("rad", "give")),
-        ("a1 [rad],a2,a3,a4,a5,a6\n1,2,3,4,5,6\n", False, ("in rad", "give --si")),
-        ("a1,a2,a3,a4,a5,a6 [deg]\n1,2,3,4,5,6\n", True, ("in deg", "leave out --si")),
-        ("a1,a2,a3,a4,a5,a6,qd1 [rad/s],qd2,qd3,qd4,qd5,qd6\n", False, ("rad/s", "give --si")),
-    ],
-)
-def test_units_that_differ_from_those_read_are_refused(
-    text: str, si: bool, words: tuple[str, ...]
-) -> None:
-    complains(kr16("dynamics", "-", "--json", *["--si"] * si, stdin=text), "stdin", *words)
-
-
-def test_a_file_in_mixed_units_must_be_converted() -> None:
-    text = "x,y,z,a,b,c,units\n1,2,3,4,5,6,mm rad\n"
-    for options in ((), ("--si",)):
-        complains(kr16("ik", "-", "--json", *options, stdin=text), "mm rad", "convert it")
-
-
-@pytest.mark.parametrize("units", ["furlongs", "", "[1, 2]", '{"q": "deg"}'])
-def test_units_of_somebody_elses_are_let_be(tmp_path: Path, units: str) -> None:
-    text = f"{_HEADER},units\n1,2,3,4,5,6,{units if units == 'furlongs' else ''}\n"
-    assert kr16("fk", "-", stdin=text).code == 0
-    np.savez(tmp_path / "q.npz", q=np.zeros((1, 6)), units=np.array(units))
-    assert kr16("fk", "--input", tmp_path / "q.npz").code == 0
-    np.savez(tmp_path / "q.npz", q=np.zeros((1, 6)), units=np.array([1.0]))
-    assert kr16("fk", "--input", tmp_path / "q.npz").code == 0
-
-
-# What has no columns ------------------------------------------------------------------------------
-
-_NO_COLUMNS = [
-    ("fk", "--frames all", "--frames all; it is in json and npz"),
-    ("dynamics", "--task", "--task; it is in json and npz"),
-    ("dynamics", "--christoffel", "--christoffel; it is in json and npz"),
-]
-
-
-@pytest.mark.parametrize(("command", "options", "said"), _NO_COLUMNS)
-def test_csv_says_what_it_has_no_columns_for(command: str, options: str, said: str) -> None:
-    text = f"{_HEADER}\n10,-70,80,35,-40,20\n"
-    words = [command, *options.split()]
-    single = kr16(*words, 10, -70, 80, 35, -40, 20, "--format", "csv")
-    assert single.err == f"kr16: warning: csv has no columns for {said}\n"
-    rows = kr16(*words, "-", "--format", "csv", stdin=text)
-    assert rows.err == single.err
-    assert rows.out == single.out
-    assert f"table has no columns for {said}" in kr16(*words, "-", stdin=text).err
-    assert kr16(*words, "-", "--json", stdin=text).json()["warnings"] == []
-    assert kr16(command, "-", "--format", "csv", stdin=text).err == ""
-
-
-def test_npz_holds_what_csv_has_no_columns_for(tmp_path: Path) -> None:
-    file = tmp_path / "out.npz"
-    for command, options, _ in _NO_COLUMNS:
-        done = kr16(command, *options.split(), 10, -70, 80, 35, -40, 20, "-o", file)
-        assert (done.code, done.err) == (0, "")
-        with np.load(file) as archive:
-            wanted = {"fk": "T_frame3", "dynamics": options[2:]}[command]
-            assert any(name.startswith(wanted) for name in archive.files)
-
-
-def test_variants_of_turns_are_in_json_only() -> None:
-    done = kr16("ik 1200 100 900 0 120 0 --turns --format csv")
-    assert done.err == (
-        "kr16: warning: csv has no columns for the variants of --turns; they are in json\n"
-    )
-    assert len(_rows(done.out)) == 1
-
-
-def test_singular_values_and_friction_have_columns() -> None:
-    q = (10, -70, 80, 35, -40, 20)
-    (row,) = _rows(kr16("jacobian", *q, "--format", "csv").out)
-    result = kr16("jacobian", *q, "--json").result()
-    assert [float(row[f"sigma_{i}"]) for i in range(1, 7)] == result["singular_values"]
-    words = ("dynamics", *q, "--drives", "--qd", 10, -20, 30, -40, 50, 60)
-    (row,) = _rows(kr16(*words, "--format", "csv").out)
-    result = kr16(*words, "--json").result()
-    assert [float(row[f"friction_{i}"]) for i in range(1, 7)] == result["friction"]
-    assert "friction_1" not in _rows(kr16("dynamics", *q, "--format", "csv").out)[0]

@@ -15,26 +15,21 @@ import numpy as np
 import pytest
 
 from command_line import Outcome, complains, kr16
+from joint_tables import HEADER, WIDE, csv_of, rows_of
 from kr16cli.cli import blocks, rows
 
-_WIDE = ((-185, 185), (-155, 35), (-130, 154), (-350, 350), (-130, 130), (-350, 350))
-_JOINTS = "a1,a2,a3,a4,a5,a6"
 _RATES = ",".join(f"{group}{i}" for group in ("qd", "qdd") for i in range(1, 7))
 
 
 def _joints(count: int, seed: int = 5) -> list[list[float]]:
     """Random configurations, every fifth of round angles and every seventh beyond a limit."""
     draw = random.Random(seed)
-    found = [[draw.uniform(lo, hi) for lo, hi in _WIDE] for _ in range(count)]
+    found = [[draw.uniform(lo, hi) for lo, hi in WIDE] for _ in range(count)]
     for i in range(0, count, 5):
         found[i] = [90.0 * round(v / 90.0) for v in found[i]]
     for row in found[3::7]:
         row[1] = 40.0
     return found
-
-
-def _csv(table: list[list[float]], header: str = _JOINTS) -> str:
-    return "\n".join([header, *(",".join(map(repr, row)) for row in table)]) + "\n"
 
 
 def _bad(text: str) -> str:
@@ -86,7 +81,7 @@ _ASKED = [
 @pytest.mark.parametrize("asked", _ASKED)
 def test_blocks_answer_as_rows_do(asked: str, monkeypatch: pytest.MonkeyPatch) -> None:
     words = (*asked.split(), "-", "--format", "csv")
-    one, other = _both(monkeypatch, *words, stdin=_bad(_csv(_joints(150))))
+    one, other = _both(monkeypatch, *words, stdin=_bad(csv_of(_joints(150))))
     assert (one.code, other.code) == (1, 1)
     assert one.err == other.err
     assert "row 9: " in one.err
@@ -94,7 +89,7 @@ def test_blocks_answer_as_rows_do(asked: str, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_rates_of_the_rows_are_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    text = _bad(_csv([[*q, *q, *q] for q in _joints(80)], f"{_JOINTS},{_RATES}"))
+    text = _bad(csv_of([[*q, *q, *q] for q in _joints(80)], f"{HEADER},{_RATES}"))
     one, other = _both(monkeypatch, "dynamics", "-", "--format", "csv", stdin=text)
     assert "torque_1" in one.out.partition("\n")[0]
     assert (one.code, one.err) == (other.code, other.err)
@@ -103,7 +98,7 @@ def test_rates_of_the_rows_are_taken(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _poses() -> str:
     """Poses in every state: reachable, singular, out of reach, of joints beyond limits, bad."""
-    done = kr16("fk", "-", "--format", "csv", stdin=_csv(_joints(120)))
+    done = kr16("fk", "-", "--format", "csv", stdin=csv_of(_joints(120)))
     far = "9000,0,500,0,90,0,mm deg,ok,\n300,0,300,0,0,0,mm deg,ok,\n"
     table = [line.split(",") for line in done.out.splitlines()]
     kept = [",".join([*line[:6], *line[8:]]) for line in table]
@@ -121,14 +116,14 @@ def test_blocks_of_poses_are_solved_as_rows_are(
     one, other = _both(monkeypatch, "ik", "-", "--format", "csv", *options.split(), stdin=_poses())
     assert (one.code, other.code) == (1, 1)
     assert one.err == other.err
-    words = {row["status"] for row in csv.DictReader(io.StringIO(one.out))}
+    words = {row["status"] for row in rows_of(one.out)}
     assert words >= {"ok", "bad", "unreachable"}
     _same(_residuals_left_out(one.out), _residuals_left_out(other.out))
 
 
 def _residuals_left_out(text: str) -> str:
     """Residuals are rounding itself."""
-    table = list(csv.DictReader(io.StringIO(text)))
+    table = rows_of(text)
     for row in table:
         assert not row["residual"] or float(row["residual"]) < 1e-9
         del row["residual"]
@@ -152,7 +147,7 @@ def test_npz_of_blocks_is_that_of_rows(
         T[:, 2, 3] += 0.001 * np.arange(50)
         arrays = {"T": T}
     else:
-        text, arrays = _bad(_csv(_joints(80))), {"q": np.array(_joints(80))}
+        text, arrays = _bad(csv_of(_joints(80))), {"q": np.array(_joints(80))}
         arrays["q"][5, 2] = np.nan
     given, out = tmp_path / "in.npz", tmp_path / "out.npz"
     np.savez(given, **arrays)  # type: ignore[arg-type]
@@ -187,7 +182,7 @@ def test_npz_of_blocks_is_that_of_rows(
     ids=["semicolons", "tabs", "windows", "cr", "blanks", "quotes"],
 )  # fmt: skip
 def test_every_dialect_reads_the_same(dialect: object, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = _csv([[*q[:5], 5.5] for q in _joints(200)])
+    text = csv_of([[*q[:5], 5.5] for q in _joints(200)])
     one, other = _both(monkeypatch, "fk", "-", "--format", "csv", stdin=dialect(text))  # type: ignore[operator]
     assert (one.code, one.err) == (other.code, other.err)
     _same(one.out, other.out)
@@ -195,7 +190,7 @@ def test_every_dialect_reads_the_same(dialect: object, monkeypatch: pytest.Monke
 
 
 def test_json_and_tables_of_long_files_are_as_of_short(monkeypatch: pytest.MonkeyPatch) -> None:
-    text = _bad(_csv(_joints(70)))
+    text = _bad(csv_of(_joints(70)))
     one, other = _both(monkeypatch, "fk", "-", "--json", stdin=text)
     first, second = (json.loads(done.out) for done in (one, other))
     assert first["input"] == second["input"]
@@ -211,7 +206,7 @@ def test_what_is_wrong_far_down_is_told_and_nothing_written(
 ) -> None:
     out = tmp_path / "out.csv"
     out.write_text("before")
-    text = _csv(_joints(150))
+    text = csv_of(_joints(150))
     cases: list[tuple[bytes, tuple[object, ...], tuple[str, ...]]] = [
         (_bad(text).encode(), ("--strict",), ("row 9", "5 such rows", "nothing is written")),
         (text.encode() + b"1,2,3,\xff,5,6\n", (), (f"not UTF-8 text at byte {len(text) + 6}",)),
@@ -226,7 +221,7 @@ def test_what_is_wrong_far_down_is_told_and_nothing_written(
 
 
 def test_blocks_without_a_sound_row(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    lines = [f"{_JOINTS}", *["1,2,3,4,5,"] * 400, "0,-90,90,0,0,0", *["1,2,3,4,x,6"] * 400]
+    lines = [f"{HEADER}", *["1,2,3,4,5,"] * 400, "0,-90,90,0,0,0", *["1,2,3,4,x,6"] * 400]
     one, other = _both(monkeypatch, "fk", "-", "--format", "csv", stdin="\n".join(lines))
     assert one == other
     assert one.out.count(",bad,") == 800
@@ -237,7 +232,7 @@ def test_blocks_without_a_sound_row(monkeypatch: pytest.MonkeyPatch, tmp_path: P
 
 
 def test_a_payload_beyond_the_rating_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    text = _csv([[0.0, -90.0, 90.0, 10.0, 20.0, 30.0]] * 50)
+    text = csv_of([[0.0, -90.0, 90.0, 10.0, 20.0, 30.0]] * 50)
     words = ("dynamics", "-", "--payload", 99, 0, 0, 0, "--format", "csv")
     one, other = _both(monkeypatch, *words, stdin=text)
     assert "rows 1, 2, 3 and 47 more: payload 99 kg exceeds" in one.err
@@ -245,9 +240,9 @@ def test_a_payload_beyond_the_rating_is_told_once(monkeypatch: pytest.MonkeyPatc
 
 
 def test_huge_numbers_are_told_row_by_row(monkeypatch: pytest.MonkeyPatch) -> None:
-    header = f"{_JOINTS},{','.join(f'qd{i}' for i in range(1, 7))}"
+    header = f"{HEADER},{','.join(f'qd{i}' for i in range(1, 7))}"
     table = [[*q, *([1e200] * 6 if i == 20 else q)] for i, q in enumerate(_joints(40))]
-    one, other = _both(monkeypatch, "dynamics", "-", "--format", "csv", stdin=_csv(table, header))
+    one, other = _both(monkeypatch, "dynamics", "-", "--format", "csv", stdin=csv_of(table, header))
     assert (one.code, one.err) == (other.code, other.err)
     assert "row 21: the result is not finite" in one.err
     _same(one.out, other.out)
@@ -259,7 +254,7 @@ def test_memory_does_not_grow_with_the_rows(tmp_path: Path) -> None:
     for count in (20_000, 80_000):
         table = tmp_path / f"{count}.csv"
         line = "10.123456789,-80.123456789,95.123456789,1.5,-45.123456789,30.123456789\n"
-        table.write_text(f"{_JOINTS}\n{line * count}")
+        table.write_text(f"{HEADER}\n{line * count}")
         tracemalloc.start()
         try:
             assert kr16("fk", "--input", table, "-o", tmp_path / "out.csv").code == 0
@@ -277,7 +272,7 @@ def test_twenty_thousand_rows_take_little_more_than_their_text(
 ) -> None:
     """Beside reading and writing the same numbers as text, and beside row by row."""
     table = tmp_path / "joints.csv"
-    table.write_text(_csv(_joints(20_000)))
+    table.write_text(csv_of(_joints(20_000)))
 
     def text_alone() -> None:
         with table.open() as lines:
@@ -297,7 +292,7 @@ def test_twenty_thousand_rows_take_little_more_than_their_text(
         return min(times)
 
     short = tmp_path / "short.csv"
-    short.write_text(_csv(_joints(2_000)))
+    short.write_text(csv_of(_joints(2_000)))
     quick, text = seconds(asked, 200, table), seconds(text_alone)
     assert quick < 4.0 * text
     assert quick < 0.3 * 10 * seconds(asked, 10**9, short)

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import duals
 import kr16cli
 import oracles
 import strategies as sg
@@ -19,6 +20,7 @@ from kr16cli.kernels.parameters import parameters
 from kr16cli.model import derivatives, dynamics, inertia
 from kr16cli.model.derivatives import Derivatives
 from kr16cli.model.scalars import FLOATS
+from pinocchio_peer import Pinocchio
 
 ENGINES = ["as installed", "numpy"]
 PARTS = ("inverse_dynamics_derivatives", "forward_dynamics_derivatives")
@@ -69,11 +71,11 @@ def test_directional_derivatives_hold_exactly(seed: int, regrouped: bool) -> Non
     cs = [oracles.rational_turn(t) for t in _fractions(source, 6)]
     qd, qdd, u, v, w, rotors = (_fractions(source, 6) for _ in range(6))
     fixed = (bodies, g, _fractions(source, 3), rotors)
-    turned = oracles.dual_turns(*(np.array(x, dtype=object) for x in zip(*cs, strict=True)), u)
+    turned = duals.dual_turns(*(np.array(x, dtype=object) for x in zip(*cs, strict=True)), u)
     moved = (
         list(zip(*turned, strict=True)),
-        [oracles.Dual(a, b) for a, b in zip(qd, v, strict=True)],
-        [oracles.Dual(a, b) for a, b in zip(qdd, w, strict=True)],
+        [duals.Dual(a, b) for a, b in zip(qd, v, strict=True)],
+        [duals.Dual(a, b) for a, b in zip(qdd, w, strict=True)],
     )
     tau = dynamics.inverse_dynamics(*moved, *fixed)
     change = [t.eps for t in tau]
@@ -115,7 +117,7 @@ def test_pinocchios_derivatives(
     robot = kr16cli.load_robot(payload=load).with_gravity(gravity)
     robot = numpy_engine(robot) if engine == "numpy" else robot
     g = robot.data.geometry
-    other = oracles.Pinocchio(g, oracles.bodies(g, robot.data.links, load), gravity)
+    other = Pinocchio(g, oracles.bodies(g, robot.data.links, load), gravity)
     rng = np.random.default_rng(8)
     q, qd, qdd = rng.uniform(-3, 3, (3, 100, 6))
     tau = robot.inverse_dynamics(q, qd, qdd)

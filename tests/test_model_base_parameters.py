@@ -16,6 +16,7 @@ from kr16cli.model import dynamics, inertia
 from kr16cli.model.inertia import Body
 from kr16cli.model.scalars import FLOATS
 from kr16cli.robot import Geometry
+from pinocchio_peer import Pinocchio
 
 DATA = kr16cli.load_data()
 G = DATA.geometry
@@ -127,7 +128,7 @@ def test_rank_of_pinocchios_regressor(general: bool, count: int) -> None:
     pytest.importorskip("pinocchio")
     rng = np.random.default_rng(8)
     rows = []
-    other = oracles.Pinocchio(G, oracles.bodies(G, DATA.links), DATA.gravity)
+    other = Pinocchio(G, oracles.bodies(G, DATA.links), DATA.gravity)
     for _ in range(40):
         if general:
             other.model.gravity.linear = rng.uniform(-10, 10, 3)

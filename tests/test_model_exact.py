@@ -14,6 +14,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import duals
 import oracles
 from kr16cli.model import chain, coriolis, dynamics, energy, inertia
 from kr16cli.robot import Geometry, LinkData, Payload, Provenance
@@ -85,9 +86,9 @@ def test_mass_rate_less_twice_coriolis_is_skew(
 ) -> None:
     """M' = C + C^T with the rate of the package's own M, differentiated by dual numbers."""
     bodies = inertia.regroup(inertia.robot_bodies(parts, load, g), g)
-    moving = list(zip(*oracles.dual_turns(*arrays(cs), qd), strict=True))
-    rate = oracles.eps(
-        [[v + oracles.Dual(0) for v in row] for row in dynamics.mass_matrix(moving, bodies, g)]
+    moving = list(zip(*duals.dual_turns(*arrays(cs), qd), strict=True))
+    rate = duals.eps(
+        [[v + duals.Dual(0) for v in row] for row in dynamics.mass_matrix(moving, bodies, g)]
     )
     C = np.array(coriolis.coriolis_matrix(cs, qd, bodies, g), dtype=object) + Fraction(0)
     exact(rate, C + C.T)
@@ -126,9 +127,9 @@ def test_gravity_is_the_gradient_of_potential_energy(
     bodies = inertia.robot_bodies(parts, load, g)
     gradient = []
     for unit in np.eye(6, dtype=int).tolist():
-        moving = list(zip(*oracles.dual_turns(*arrays(cs), unit), strict=True))
+        moving = list(zip(*duals.dual_turns(*arrays(cs), unit), strict=True))
         value = energy.potential(chain.frames(moving, g), bodies, g, field)
-        gradient.append((value + oracles.Dual(0)).eps)
+        gradient.append((value + duals.Dual(0)).eps)
     exact(dynamics.gravity_torque(cs, inertia.regroup(bodies, g), g, field), gradient)
     other = oracles.potential(g, oracles.bodies(g, parts, load), field, *arrays(cs))
     exact([energy.potential(chain.frames(cs, g), bodies, g, field)], [other])
@@ -141,13 +142,13 @@ def test_power_is_the_rate_of_kinetic_and_potential_energy(
 ) -> None:
     full = inertia.robot_bodies(parts, None, g)
     bodies = inertia.regroup(full, g)
-    moving = list(zip(*oracles.dual_turns(*arrays(cs), qd), strict=True))
-    speeds = [oracles.Dual(v, a) for v, a in zip(qd, qdd, strict=True)]
+    moving = list(zip(*duals.dual_turns(*arrays(cs), qd), strict=True))
+    speeds = [duals.Dual(v, a) for v, a in zip(qd, qdd, strict=True)]
     kinetic = energy.kinetic(dynamics.mass_matrix(moving, bodies, g), speeds)
     potential = energy.potential(chain.frames(moving, g), full, g, field)
     tau = dynamics.inverse_dynamics(cs, qd, qdd, bodies, g, field)
     power = sum((v * (t + Fraction(0)) for v, t in zip(qd, tau, strict=True)), Fraction(0))
-    exact([power], [(kinetic + potential + oracles.Dual(0)).eps])
+    exact([power], [(kinetic + potential + duals.Dual(0)).eps])
 
 
 @few

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import duals
 import kr16cli
 import oracles
 import strategies as sg
@@ -133,14 +134,14 @@ def test_jacobian_and_rate_equal_the_oracles_exactly(
     g = type(G)(*(Fraction(repr(v)) for v in G))
     point = [Fraction(1, 7), Fraction(-2, 5), Fraction(3, 11)]
     c, s = (np.array(v, dtype=object) for v in zip(*cs, strict=True))
-    c, s = oracles.dual_turns(c, s, qd)
+    c, s = duals.dual_turns(c, s, qd)
     frames = [oracles.ROBROOT_OF_BASE @ frame for frame in oracles.dh_frames(g, c, s)]
     frames[6] = oracles.flange(g, c, s)
     here = frames[link] @ np.array([*point, 1], dtype=object)
     expected = oracles.jacobian(g, c, s, here[:3], link)
     view = View(g, link, point)
-    _assert_exact(view.jacobian(cs), oracles.real(expected))
-    _assert_exact(view.jacobian_dot(cs, qd), oracles.eps(expected))
+    _assert_exact(view.jacobian(cs), duals.real(expected))
+    _assert_exact(view.jacobian_dot(cs, qd), duals.eps(expected))
 
 
 def _assert_exact(rows: Any, expected: np.ndarray) -> None:

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import duals
 import kr16cli
 import oracles
 import strategies as sg
@@ -21,7 +22,7 @@ G = DATA.geometry
 BODIES = oracles.bodies(G, DATA.links)
 
 
-@pytest.mark.parametrize("module", ["oracles", "strategies"])
+@pytest.mark.parametrize("module", ["duals", "oracles", "pinocchio_peer", "strategies"])
 def test_imports_nothing_of_the_package(module: str) -> None:
     tree = ast.parse((Path(__file__).parent / f"{module}.py").read_text(encoding="utf-8"))
     names = {
@@ -36,15 +37,15 @@ def test_imports_nothing_of_the_package(module: str) -> None:
     }
     assert "kr16cli" not in names
     assert names <= {
-        "__future__", "collections", "functools", "hypothesis", "math", "numbers", "numpy",
-        "pinocchio", "typing",
+        "__future__", "collections", "duals", "functools", "hypothesis", "math", "numbers", "numpy",
+        "oracles", "pinocchio", "typing",
     }  # fmt: skip
 
 
 @given(st.fractions(-9, 9), st.fractions(-9, 9).filter(bool))
 def test_dual_numbers_differentiate_rational_functions(x: Fraction, k: Fraction) -> None:
     """f = (k x^2 - x + 3) / (x^2 + 1), by the quotient rule."""
-    v = oracles.Dual(x, Fraction(1))
+    v = duals.Dual(x, Fraction(1))
     f = (k * v * v - v + 3) / (v * v + 1)
     top, bottom = k * x * x - x + 3, x * x + 1
     assert f.real == top / bottom

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import duals
 import kr16cli
 import oracles
 import strategies as sg
@@ -100,12 +101,12 @@ def test_inverse_rate_matrix_inverts(angles: tuple[float, float, float]) -> None
 def test_rate_matrix_dot_is_its_derivative(
     angles: tuple[float, float, float], rates: list[float]
 ) -> None:
-    cs = list(zip(*oracles.dual_turns(*oracles.turns(angles), rates), strict=True))
-    rows = [[v + oracles.Dual(0.0) for v in row] for row in orientation.rate_matrix(cs)]
+    cs = list(zip(*duals.dual_turns(*oracles.turns(angles), rates), strict=True))
+    rows = [[v + duals.Dual(0.0) for v in row] for row in orientation.rate_matrix(cs)]
     ours = np.array(orientation.rate_matrix_dot(FLOATS.trig(angles), rates), dtype=object).astype(
         float
     )
-    assert np.abs(ours - oracles.eps(rows).astype(float)).max() <= 1e-14
+    assert np.abs(ours - duals.eps(rows).astype(float)).max() <= 1e-14
 
 
 def test_arrays_give_the_same_as_one_at_a_time(robot: kr16cli.Robot) -> None:

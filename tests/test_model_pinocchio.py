@@ -10,6 +10,7 @@ import pytest
 import kr16cli
 import oracles
 from kr16cli import Payload
+from pinocchio_peer import Pinocchio
 
 pytest.importorskip("pinocchio")
 
@@ -31,7 +32,7 @@ class Pair:
         data = kr16cli.load_data(name).with_gravity(gravity)
         self.ours = kr16cli.Robot(data, payload=load)
         bodies = oracles.bodies(data.geometry, data.links, load)
-        self.theirs = oracles.Pinocchio(data.geometry, bodies, gravity)
+        self.theirs = Pinocchio(data.geometry, bodies, gravity)
         rng = np.random.default_rng(20)
         self.q = rng.uniform(-np.pi, np.pi, (SAMPLES, 6))
         self.qd, self.qdd = rng.uniform(-4, 4, (2, SAMPLES, 6))
@@ -112,9 +113,7 @@ def test_rotors_are_pinocchios_armature() -> None:
     """Reflected inertia counted once: Pinocchio's armature is on the link side of the gear."""
     data = kr16cli.load_data()
     ours = kr16cli.Robot(data, drives=True)
-    theirs = oracles.Pinocchio(
-        data.geometry, oracles.bodies(data.geometry, data.links), data.gravity
-    )
+    theirs = Pinocchio(data.geometry, oracles.bodies(data.geometry, data.links), data.gravity)
     motors = [1.3e-3, 1.3e-3, 1.3e-3, 1.6e-4, 1.8e-4, 4.3e-5]
     theirs.model.armature = motors * np.square([125, 125, 125, 74.444, 42.222, 24.117])
     rng = np.random.default_rng(21)

@@ -22,6 +22,7 @@ import pytest
 import kr16cli
 import oracles
 from kr16cli.kernels import engine_name
+from pinocchio_peer import Pinocchio
 
 MANY, LOOP, FEW = 100_000, 2_000, 50
 
@@ -61,9 +62,7 @@ def measured(benchmark: Any, call: Callable[[], Any], n: int) -> float | None:
 def pinocchio(quantity: str, robot: kr16cli.Robot) -> Callable[..., Any]:
     """Pinocchio's own call for a quantity, with nothing of ours around it."""
     data = robot.data
-    built = oracles.Pinocchio(
-        data.geometry, oracles.bodies(data.geometry, data.links), data.gravity
-    )
+    built = Pinocchio(data.geometry, oracles.bodies(data.geometry, data.links), data.gravity)
     pin, common = built.pin, (built.model, built.data)
     frame = built.flange, built.pin.LOCAL_WORLD_ALIGNED
 
