@@ -35,7 +35,7 @@ static void torque_along(const point *at, const double *qd, const double *dqd, c
     memcpy(din, at->dcs, 12 * sizeof *in);
     memcpy(din + 12, dqd, 6 * sizeof *in);
     memcpy(din + 18, da, 6 * sizeof *in);
-    kr16_along(&kr16_inverse_dynamics_tape, at->plant->p, in, din, dtau);
+    kr16_along(&kr16_inverse_dynamics_tape, at->plant->p, in, din, NULL, dtau);
 }
 
 static void add_friction(const point *at, double sign, double *dtau)
@@ -43,7 +43,7 @@ static void add_friction(const point *at, double sign, double *dtau)
     double extra[6];
     if (!at->plant->drives)
         return;
-    kr16_along(&kr16_friction_tape, at->plant->p, at->x + 6, at->dx + 6, extra);
+    kr16_along(&kr16_friction_tape, at->plant->p, at->x + 6, at->dx + 6, NULL, extra);
     for (int i = 0; i < 6; i++)
         dtau[i] += sign * extra[i];
 }
@@ -71,8 +71,7 @@ static void target_along(const point *at, double *target, double *dtarget)
     trig_along(in, at->du + Q_REF, din);
     memcpy(in + 12, qd, 6 * sizeof *in);
     memcpy(din + 12, dqd, 6 * sizeof *in);
-    kr16_motion(at->plant->p, in, motion);
-    kr16_along(&kr16_motion_tape, at->plant->p, in, din, change);
+    kr16_along(&kr16_motion_tape, at->plant->p, in, din, motion, change);
     memcpy(dtarget, change, 12 * sizeof *dtarget);
     for (int i = 0; i < 6; i++) {
         const double *J = motion + 12 + 6 * i, *dJ = change + 12 + 6 * i;
@@ -88,20 +87,18 @@ static void target_along(const point *at, double *target, double *dtarget)
 static void task_wanted(const point *at, double *a, double *da)
 {
     kr16_plant *plant = at->plant;
-    double in[TASK_INPUTS], din[TASK_INPUTS] = {0.0}, found[7];
+    double in[TASK_INPUTS], din[TASK_INPUTS] = {0.0}, found[7], change[7];
     memcpy(in + TASK_Q, at->cs, 12 * sizeof *in);
     memcpy(in + TASK_QD, at->x + 6, 6 * sizeof *in);
     memcpy(din + TASK_Q, at->dcs, 12 * sizeof *in);
     memcpy(din + TASK_QD, at->dx + 6, 6 * sizeof *in);
-    kr16_motion(plant->p, in, in + TASK_MOTION);
-    kr16_along(&kr16_motion_tape, plant->p, in, din, din + TASK_MOTION);
+    kr16_along(&kr16_motion_tape, plant->p, in, din, in + TASK_MOTION, din + TASK_MOTION);
     target_along(at, in + TASK_TARGET, din + TASK_TARGET);
     memcpy(in + TASK_KP, plant->kp, sizeof plant->kp);
     memcpy(in + TASK_KD, plant->kd, sizeof plant->kd);
-    kr16_task(plant->p, in, found);
+    kr16_along(&kr16_task_tape, plant->p, in, din, found, change);
     memcpy(a, found, 6 * sizeof *a);
-    kr16_along(&kr16_task_tape, plant->p, in, din, found);
-    memcpy(da, found, 6 * sizeof *da);
+    memcpy(da, change, 6 * sizeof *da);
 }
 
 /* What is asked of the drives. */
@@ -182,8 +179,7 @@ static void add_wrench(const point *at, double *dtau)
     double in[18] = {0.0}, din[18] = {0.0}, motion[54], change[54];
     memcpy(in, at->cs, 12 * sizeof *in);
     memcpy(din, at->dcs, 12 * sizeof *in);
-    kr16_motion(at->plant->p, in, motion);
-    kr16_along(&kr16_motion_tape, at->plant->p, in, din, change);
+    kr16_along(&kr16_motion_tape, at->plant->p, in, din, motion, change);
     for (int i = 0; i < 6; i++)
         for (int j = 0; j < 6; j++)
             dtau[j] += change[12 + 6 * i + j] * w[i] + motion[12 + 6 * i + j] * dw[i];
@@ -244,7 +240,7 @@ int kr16_outputs_along(kr16_instance *instance, uint32_t groups, const double *d
     trig_along(at.cs, dx, at.dcs);
     memcpy(change + SLOT_Q, dx, sizeof at.dx);
     if (groups & 1u << GROUP_POSE)
-        kr16_along(&kr16_pose_tape, at.plant->p, at.cs, at.dcs, change + SLOT_POSE_X);
+        kr16_along(&kr16_pose_tape, at.plant->p, at.cs, at.dcs, NULL, change + SLOT_POSE_X);
     if (groups & 1u << GROUP_ENERGY)
         energy_along(&at, change + SLOT_ENERGY_KINETIC);
     if (!(groups & torques))

@@ -3,25 +3,14 @@
 
 #include <string.h>
 
-#include "kr16_fmu.h"
+#include "calls.h"
 
-#define AT(phase) (1u << (phase))
-#define ANY (AT(FAILED + 1) - 1u)
-
-
-/* The instance behind c, or return. */
 #define ENTER(name, allowed)                                                                       \
     kr16_instance *self = c;                                                                       \
-    if (!self)                                                                                     \
-        return fmi2Error;                                                                          \
-    if (kr16_must_be(self, name, allowed) != OK)                                                   \
+    if (kr16_enter(self, name, allowed) != OK)                                                     \
     return fmi2Error
 
-#define NEED(condition, name)                                                                      \
-    if (!(condition))                                                                              \
-    return (fmi2Status)kr16_fail(self, "%s: an argument is missing (NULL)", name)
-
-static void tell(kr16_instance *self, int status, const char *category, const char *text)
+static void tell2(kr16_instance *self, int status, const char *category, const char *text)
 {
     fmi2CallbackLogger log = (fmi2CallbackLogger)self->callback;
     if (log)
@@ -40,8 +29,7 @@ const char *fmi2GetVersion(void)
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[])
 {
-    ENTER("setDebugLogging", ANY);
-    return (fmi2Status)kr16_log_categories(self, on, n, names);
+    return (fmi2Status)kr16_call_log(c, on, n, names);
 }
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
@@ -54,18 +42,15 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     if (!self)
         return NULL;
     if (functions) {
-        self->tell = tell;
+        self->tell = tell2;
         self->environment = functions->componentEnvironment;
         self->callback = (void (*)(void))functions->logger;
     }
     kr16_log_categories(self, logging, 0, NULL);
-    if (!guid || strcmp(guid, kr16_robot.token) != 0) {
-        kr16_fail(self, "instantiate: the GUID %.60s is not that of this build, %.60s",
-                  guid ? guid : "(none)", kr16_robot.token);
-        kr16_free(self);
-        return NULL;
-    }
-    return self;
+    if (kr16_known(self, guid))
+        return self;
+    kr16_free(self);
+    return NULL;
 }
 
 void fmi2FreeInstance(fmi2Component c)
@@ -89,117 +74,81 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
-    ENTER("exitInitializationMode", AT(INITIALIZING));
-    return (fmi2Status)kr16_leave_initialization(self);
+    return (fmi2Status)kr16_call_leave_initialization(c);
 }
 
 fmi2Status fmi2Terminate(fmi2Component c)
 {
-    ENTER("terminate", ANY & ~AT(TERMINATED));
-    self->core.phase = TERMINATED;
-    return fmi2OK;
+    return (fmi2Status)kr16_call_terminate(c);
 }
 
 fmi2Status fmi2Reset(fmi2Component c)
 {
-    ENTER("reset", ANY);
-    return (fmi2Status)kr16_reset(self);
+    return (fmi2Status)kr16_call_reset(c);
 }
 
-/* Values ---------------------------------------------------------------------------------- */
+/* Values. Some hosts read Booleans as numbers. ---------------------------------------------- */
 
-#define GETTER(NAME, TYPE, WANT, CONVERTED)                                                        \
+#define VALUES(NAME, TYPE, CODE, READ, WRITTEN)                                                    \
     fmi2Status fmi2Get##NAME(fmi2Component c, const fmi2ValueReference vr[], size_t n,             \
                              TYPE value[])                                                         \
     {                                                                                              \
-        ENTER("get" #NAME, ANY);                                                                   \
-        NEED(!n || (vr && value), "get" #NAME);                                                    \
-        for (size_t k = 0; k < n; k++) {                                                           \
-            const double *found;                                                                   \
-            size_t count;                                                                          \
-            if (kr16_look(self, "get" #NAME, vr[k], WANT, &found, &count) != OK)                   \
-                return fmi2Error;                                                                  \
-            value[k] = CONVERTED;                                                                  \
-        }                                                                                          \
-        return fmi2OK;                                                                             \
-    }
-
-#define SETTER(NAME, TYPE, WANT, FROM)                                                             \
+        return (fmi2Status)kr16_call_get(c, "get" #NAME, vr, n, READ, CODE, value, n);             \
+    }                                                                                              \
     fmi2Status fmi2Set##NAME(fmi2Component c, const fmi2ValueReference vr[], size_t n,             \
                              const TYPE value[])                                                   \
     {                                                                                              \
-        ENTER("set" #NAME, ANY);                                                                   \
-        return (fmi2Status)kr16_put(self, "set" #NAME, vr, n, WANT, FROM, value, n);               \
+        return (fmi2Status)kr16_call_set(c, "set" #NAME, vr, n, WRITTEN, CODE, value, n);          \
     }
 
-/* Some hosts read Booleans as numbers. */
-GETTER(Real, fmi2Real, WANT_REAL | WANT_INTEGER | WANT_BOOLEAN, *found)
-GETTER(Integer, fmi2Integer, WANT_INTEGER | WANT_BOOLEAN, (fmi2Integer)*found)
-GETTER(Boolean, fmi2Boolean, WANT_BOOLEAN, *found != 0.0)
-SETTER(Real, fmi2Real, WANT_REAL, FROM_DOUBLE)
-SETTER(Integer, fmi2Integer, WANT_INTEGER, FROM_INT)
-SETTER(Boolean, fmi2Boolean, WANT_BOOLEAN, FROM_INT)
+VALUES(Real, fmi2Real, AS_DOUBLE, WANT_REAL | WANT_INTEGER | WANT_BOOLEAN, WANT_REAL)
+VALUES(Integer, fmi2Integer, AS_INT, WANT_INTEGER | WANT_BOOLEAN, WANT_INTEGER)
+VALUES(Boolean, fmi2Boolean, AS_INT, WANT_BOOLEAN, WANT_BOOLEAN)
 
+/* No variable is of type String: of no type is wanted. */
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                          fmi2String value[])
 {
-    (void)vr;
-    (void)value;
-    ENTER("getString", ANY);
-    return n ? (fmi2Status)kr16_fail(self, "getString: there are no variables of type String")
-             : fmi2OK;
+    return (fmi2Status)kr16_call_get(c, "getString", vr, n, 0, AS_DOUBLE, value, n);
 }
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                          const fmi2String value[])
 {
-    (void)vr;
-    (void)value;
-    ENTER("setString", ANY);
-    return n ? (fmi2Status)kr16_fail(self, "setString: there are no variables of type String")
-             : fmi2OK;
+    return (fmi2Status)kr16_call_set(c, "setString", vr, n, 0, AS_DOUBLE, value, n);
 }
 
 /* States ---------------------------------------------------------------------------------- */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
-    ENTER("getFMUstate", ANY);
-    NEED(state, "getFMUstate");
-    return (fmi2Status)kr16_save(self, state);
+    return (fmi2Status)kr16_call_save(c, state);
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 {
-    ENTER("setFMUstate", ANY);
-    return (fmi2Status)kr16_restore(self, state);
+    return (fmi2Status)kr16_call_restore(c, state);
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
-    ENTER("freeFMUstate", ANY);
-    return (fmi2Status)kr16_forget(self, state);
+    return (fmi2Status)kr16_call_forget(c, state);
 }
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
 {
-    ENTER("serializedFMUstateSize", ANY);
-    NEED(state && size, "serializedFMUstateSize");
-    *size = kr16_state_size();
-    return fmi2OK;
+    return (fmi2Status)kr16_call_state_size(c, state, size);
 }
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
 {
-    ENTER("serializeFMUstate", ANY);
-    return (fmi2Status)kr16_write_state(self, state, bytes, size);
+    return (fmi2Status)kr16_call_write_state(c, state, bytes, size);
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
                                    fmi2FMUstate *state)
 {
-    ENTER("deSerializeFMUstate", ANY);
-    return (fmi2Status)kr16_read_state(self, bytes, size, state);
+    return (fmi2Status)kr16_call_read_state(c, bytes, size, state);
 }
 
 /* Derivatives ----------------------------------------------------------------------------- */
@@ -208,30 +157,23 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         size_t n, const fmi2ValueReference knowns[], size_t m,
                                         const fmi2Real seeds[], fmi2Real results[])
 {
-    ENTER("getDirectionalDerivative", ANY & ~AT(INSTANTIATED));
     const kr16_request request = {
         "getDirectionalDerivative", unknowns, n, knowns, m, seeds, m, results, n};
-    return (fmi2Status)kr16_directional(self, &request);
+    return (fmi2Status)kr16_call_derivatives(c, &request, 0);
 }
 
 /* Model exchange -------------------------------------------------------------------------- */
 
-#define EXCHANGE(name)                                                                             \
-    if (!self->model_exchange)                                                                     \
-    return (fmi2Status)kr16_fail(self, "%s: the instance is one of co-simulation", name)
-
 fmi2Status fmi2EnterEventMode(fmi2Component c)
 {
-    ENTER("enterEventMode", AT(CONTINUOUS_TIME));
-    self->core.phase = EVENT;
-    kr16_stale(self);
-    return fmi2OK;
+    return (fmi2Status)kr16_call_event_mode(c);
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info)
 {
     ENTER("newDiscreteStates", AT(EVENT));
-    NEED(info, "newDiscreteStates");
+    if (!info)
+        return (fmi2Status)kr16_missing(self, "newDiscreteStates");
     memset(info, 0, sizeof *info);
     kr16_hold_flags(self);
     return fmi2OK;
@@ -239,91 +181,47 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info)
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
 {
-    ENTER("enterContinuousTimeMode", AT(EVENT));
-    kr16_hold_flags(self);
-    self->core.phase = CONTINUOUS_TIME;
-    return fmi2OK;
+    return (fmi2Status)kr16_call_after_event(c, "enterContinuousTimeMode", CONTINUOUS_TIME);
 }
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean final, fmi2Boolean *event,
                                        fmi2Boolean *terminate)
 {
+    const fmi2Status status = (fmi2Status)kr16_call_completed_step(c, event && terminate);
     (void)final;
-    ENTER("completedIntegratorStep", AT(CONTINUOUS_TIME));
-    NEED(event && terminate, "completedIntegratorStep");
-    kr16_watch(self);
-    *event = *terminate = fmi2False;
-    return fmi2OK;
+    if (status == fmi2OK)
+        *event = *terminate = fmi2False;
+    return status;
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
 {
-    ENTER("setTime", AT(EVENT) | AT(CONTINUOUS_TIME));
-    EXCHANGE("setTime");
-    if (!(time - time == 0.0))
-        return (fmi2Status)kr16_fail(self, "setTime: %g; it must be a finite number", time);
-    self->core.value[SLOT_TIME] = time;
-    return fmi2OK;
+    return (fmi2Status)kr16_call_set_time(c, time);
 }
-
-static fmi2Status sized(kr16_instance *self, const char *call, const void *values, size_t n,
-                        int right)
-{
-    if (!self->model_exchange)
-        return (fmi2Status)kr16_fail(self, "%s: the instance is one of co-simulation", call);
-    if (n != (size_t)right)
-        return (fmi2Status)kr16_fail(self, "%s: %lu numbers; there are %d", call, (unsigned long)n,
-                                     right);
-    if (n && !values)
-        return (fmi2Status)kr16_fail(self, "%s: an argument is missing (NULL)", call);
-    return fmi2OK;
-}
-
-#define SIZED(name, values, n, right)                                                              \
-    if (sized(self, name, values, n, right) != fmi2OK)                                             \
-    return fmi2Error
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n)
 {
-    ENTER("setContinuousStates", AT(EVENT) | AT(CONTINUOUS_TIME));
-    SIZED("setContinuousStates", x, n, kr16_states());
-    return (fmi2Status)kr16_set_states(self, x, n);
+    return (fmi2Status)kr16_call_set_states(c, x, n);
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real dx[], size_t n)
 {
-    ENTER("getDerivatives", ANY & ~AT(INSTANTIATED));
-    SIZED("getDerivatives", dx, n, kr16_states());
-    return (fmi2Status)kr16_derivatives(self, dx, n);
+    return (fmi2Status)kr16_call_rates(c, "getDerivatives", dx, n);
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n)
 {
-    ENTER("getEventIndicators", ANY & ~AT(INSTANTIATED));
-    SIZED("getEventIndicators", z, n, kr16_indicators());
-    if (n && kr16_compute(self, GROUP_MARGIN) != OK)
-        return fmi2Error;
-    if (n)
-        memcpy(z, self->core.value + SLOT_MARGIN_LOWER, n * sizeof *z);
-    return fmi2OK;
+    return (fmi2Status)kr16_call_indicators(c, z, n);
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n)
 {
-    ENTER("getContinuousStates", ANY);
-    SIZED("getContinuousStates", x, n, kr16_states());
-    if (n)
-        memcpy(x, self->core.value + SLOT_Q, n * sizeof *x);
-    return fmi2OK;
+    return (fmi2Status)kr16_call_get_states(c, x, n);
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x[], size_t n)
 {
-    ENTER("getNominalsOfContinuousStates", ANY);
-    SIZED("getNominalsOfContinuousStates", x, n, kr16_states());
-    for (size_t i = 0; i < n; i++)
-        x[i] = 1.0;
-    return fmi2OK;
+    return (fmi2Status)kr16_call_nominals(c, x, n);
 }
 
 /* Co-simulation --------------------------------------------------------------------------- */
@@ -338,16 +236,14 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                         const fmi2Integer order[], fmi2Real value[])
 {
-    ENTER("getRealOutputDerivatives", AT(STEPPING) | AT(TERMINATED));
-    return (fmi2Status)kr16_output_rises(self, vr, n, order, value, n);
+    return (fmi2Status)kr16_call_output_rises(c, vr, n, order, value, n);
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean no_set_state)
 {
     kr16_step_result result;
     (void)no_set_state;
-    ENTER("doStep", ANY);
-    return (fmi2Status)kr16_do_step(self, time, size, &result);
+    return c ? (fmi2Status)kr16_do_step(c, time, size, &result) : fmi2Error;
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c)
@@ -356,23 +252,31 @@ fmi2Status fmi2CancelStep(fmi2Component c)
     return (fmi2Status)kr16_fail(self, "cancelStep: no step is under way; doStep never waits");
 }
 
+/* A status that there is, of an instance and with a place for it; else why not. */
+static fmi2Status status_of(kr16_instance *self, const char *call, const void *value, int there)
+{
+    if (!self)
+        return fmi2Error;
+    if (!value)
+        return (fmi2Status)kr16_missing(self, call);
+    return there ? fmi2OK : fmi2Discard;
+}
+
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
 {
-    ENTER("getStatus", ANY);
-    NEED(value, "getStatus");
+    const fmi2Status found = status_of(c, "getStatus", value, 1);
     (void)kind; /* only DoStepStatus is a status, and no step is ever pending */
-    *value = self->core.phase == FAILED ? fmi2Error : fmi2OK;
-    return fmi2OK;
+    if (found == fmi2OK)
+        *value = ((kr16_instance *)c)->core.phase == FAILED ? fmi2Error : fmi2OK;
+    return found;
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
 {
-    ENTER("getRealStatus", ANY);
-    NEED(value, "getRealStatus");
-    if (kind != fmi2LastSuccessfulTime)
-        return fmi2Discard;
-    *value = self->core.value[SLOT_TIME];
-    return fmi2OK;
+    const fmi2Status found = status_of(c, "getRealStatus", value, kind == fmi2LastSuccessfulTime);
+    if (found == fmi2OK)
+        *value = ((kr16_instance *)c)->core.value[SLOT_TIME];
+    return found;
 }
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
@@ -385,12 +289,10 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
 {
-    ENTER("getBooleanStatus", ANY);
-    NEED(value, "getBooleanStatus");
-    if (kind != fmi2Terminated)
-        return fmi2Discard;
-    *value = self->core.phase == TERMINATED;
-    return fmi2OK;
+    const fmi2Status found = status_of(c, "getBooleanStatus", value, kind == fmi2Terminated);
+    if (found == fmi2OK)
+        *value = ((kr16_instance *)c)->core.phase == TERMINATED;
+    return found;
 }
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value)

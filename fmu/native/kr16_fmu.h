@@ -46,12 +46,16 @@ typedef struct {
 } kr16_range;
 
 typedef struct {
-    char name[21];
-    uint8_t kind, group, range;
+    uint8_t kind, group, range, stem; /* the stem of its name; six of one stem are [1] to [6] */
 } kr16_slot;
+
+typedef struct {
+    char text[28];
+} kr16_name;
 
 extern const kr16_slot kr16_slots[SLOTS];
 extern const kr16_range kr16_ranges[];
+kr16_name kr16_name_of(int slot);
 
 /* The equations of motion with all that parameters decide. */
 enum { TORQUE_MODE = 1, GRAVITY_MODE, PD_MODE, COMPUTED_TORQUE_MODE, TASK_SPACE_MODE };
@@ -64,16 +68,19 @@ enum { TASK_Q, TASK_QD = 12, TASK_MOTION = 18, TASK_TARGET = 72, TASK_KP = 96, T
        TASK_INPUTS = 108 };
 
 typedef struct {
-    double p[KR16_PARAMETERS];
+    double p[KR16_PARAMETERS + KR16_KEPT];
     double torque[6], speed[6];  /* what the drives are held to; infinite where nothing */
     double stiffness[6];         /* of the stops, N m/rad */
     double kp[6], kd[6];
     double step, tolerance;
     int bound, stops, drives, mode, method;
+    int sparse;                  /* the short forward dynamics will do */
     double u[INPUTS], rise[INPUTS], since; /* inputs are u + rise (t - since) */
     double target[24];           /* the flange's, of u */
     int moving, pushed;          /* an input rises; there is a wrench */
     double pitch;                /* of the orientation error where it was too large, else 0 */
+    double qdd[6];               /* accelerations where the next step begins, */
+    int known;                   /* if they are known */
 } kr16_plant;
 
 void kr16_trig(const double *angles, double *cs);
@@ -81,9 +88,8 @@ void kr16_plant_inputs(kr16_plant *plant, double t, double *u);
 int kr16_asked(kr16_plant *plant, double t, const double *x, const double *cs, double *tau);
 void kr16_applied(const kr16_plant *plant, const double *qd, double *tau);
 void kr16_contact(const kr16_plant *plant, const double *q, const double *qd, double *tau);
-void kr16_accelerate(kr16_plant *plant, double t, const double *x, const double *cs, double *tau,
-                     double *qdd);
 int kr16_plant_rates(void *plant, double t, const double *x, double *dx);
+int kr16_plant_rates_at(kr16_plant *plant, double t, const double *x, const double *cs, double *dx);
 int kr16_control(kr16_plant *plant, const double *u, const double *x, const double *cs, double *tau);
 void kr16_retarget(kr16_plant *plant, const double *u, double *target);
 
@@ -101,6 +107,7 @@ typedef struct {
     double rise[INPUTS];
     kr16_plant plant;
     double time, tolerance, hint;
+    double cs[12];       /* cosines and sines of the angles, if the group of none is up to date */
     uint32_t fresh;      /* groups that are up to date */
     uint32_t beyond;     /* joints that are beyond their limits */
     int32_t phase, ready, current; /* the plant has the parameters; and the inputs */
@@ -154,9 +161,9 @@ void kr16_stale(kr16_instance *instance);
 
 /* Values. `want` is the bits of the kinds that the call takes. */
 enum { WANT_REAL = 1, WANT_INTEGER = 2, WANT_BOOLEAN = 4 };
-int kr16_look(kr16_instance *instance, const char *call, unsigned reference, unsigned want,
-              const double **values, size_t *count);
-enum { FROM_DOUBLE, FROM_INT, FROM_BOOL };
+enum { AS_DOUBLE, AS_INT, AS_BOOL };
+int kr16_take(kr16_instance *instance, const char *call, const unsigned *references, size_t n,
+              unsigned want, int type, void *values, size_t count);
 int kr16_put(kr16_instance *instance, const char *call, const unsigned *references, size_t n,
              unsigned want, int type, const void *values, size_t count);
 int kr16_ready(kr16_instance *instance);

@@ -50,9 +50,13 @@ int kr16_setup(kr16_instance *instance, int has_tolerance, double tolerance, dou
 
 void kr16_hold_flags(kr16_instance *instance)
 {
-    /* An orientation error that is folded over leaves the flags of torque as they were. */
+    /* An orientation error that is folded over leaves the flags of torque as they were, and is
+     * told of by what asks for it. */
+    kr16_teller *tell = instance->tell;
+    instance->tell = NULL;
     for (int group = GROUP_LIMIT_POSITION; group <= GROUP_LIMIT_TORQUE; group++)
         kr16_compute(instance, group);
+    instance->tell = tell;
 }
 
 int kr16_leave_initialization(kr16_instance *instance)
@@ -88,14 +92,17 @@ void kr16_watch(kr16_instance *instance)
     }
 }
 
-static int diverged(kr16_instance *instance, double time, int status)
+/* The instance stays at the state x that it had before. */
+static int diverged(kr16_instance *instance, double time, const double *x, int status)
 {
     kr16_core *core = &instance->core;
-    const double *x = core->value + SLOT_Q;
     const char *reason = status == FOLDED ? "the orientation error passes 88.9 deg of pitch"
                          : status == STEP_VANISHED
                              ? "the solver's step vanished"
                              : "the motion is faster than the step can follow";
+    memcpy(core->value + SLOT_Q, x, STATES * sizeof *x);
+    core->value[SLOT_TIME] = time;
+    kr16_stale(instance);
     core->phase = FAILED;
     return kr16_fail(instance,
                      "at %.6g s the state leaves the range of numbers: %s; before, q = %.6g %.6g "
@@ -151,13 +158,15 @@ static int moved(kr16_instance *instance, double time, double size, kr16_step_re
     const double step = core->plant.method == DORMAND_PRINCE ? size : core->plant.step;
     const double parts = fmax(1.0, ceil(size / step - 1e-9)), h = size / parts;
     memcpy(x, core->value + SLOT_Q, sizeof x);
+    core->plant.known = time == core->value[SLOT_TIME] && core->fresh >> GROUP_QDD & 1u;
+    memcpy(core->plant.qdd, core->value + SLOT_QDD, sizeof core->plant.qdd);
     for (double k = 0.0; k < parts; k += 1.0) {
         double t = time + k * h, done = 1.0;
         memcpy(before, x, sizeof x);
         const int status = kr16_advance(&core->plant, t, h, x, &core->hint);
         if (status != FINE) {
-            memcpy(core->value + SLOT_Q, before, sizeof before);
-            return diverged(instance, t, status);
+            result->reached = t;
+            return diverged(instance, t, before, status);
         }
         if (instance->event_mode)
             done = cut(instance, t, h, before, x);
@@ -194,7 +203,7 @@ int kr16_do_step(kr16_instance *instance, double time, double size, kr16_step_re
     if (!(isfinite(size) && size > 0.0))
         return kr16_fail(instance, "communication step %g s: must be a positive number", size);
     const double slack = 1e-9 * fmax(1.0, fmax(fabs(time), fabs(now)));
-    if (!(fabs(time - now) <= fmax(slack, 1e-6 * size)))
+    if (!(isfinite(time) && fabs(time - now) <= fmax(slack, 1e-6 * size)))
         return kr16_fail(instance,
                          "communication point %g s: the instance stands at %g s; go on from there, "
                          "or set back its state first",

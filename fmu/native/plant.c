@@ -71,12 +71,24 @@ static void add_wrench(kr16_plant *plant, double t, const double *cs, double *ta
     }
 }
 
-/* qdd under the torques tau that the drives give; tau is spent. */
-void kr16_accelerate(kr16_plant *plant, double t, const double *x, const double *cs, double *tau,
-                     double *qdd)
+/* qdd of M qdd + C qd + G = tau for any robot: `in` is as for kr16_forward_dynamics. */
+static void solved(const double *p, const double *in, double *qdd)
 {
-    double in[24], extra[6];
-    add_wrench(plant, t, cs, tau);
+    double at[24] = {0.0}, bias[6], system[42];
+    memcpy(at, in, 18 * sizeof *in);
+    kr16_inverse_dynamics(p, at, bias);
+    kr16_mass_matrix(p, in, system);
+    for (int i = 0; i < 6; i++)
+        system[36 + i] = in[18 + i] - bias[i];
+    kr16_solve(NULL, system, qdd);
+}
+
+/* qdd under the torques that the drives give. `in` is what the forward dynamics takes: cosines
+ * and sines, speeds, and these torques, to which the other ones are added. */
+static void accelerate(kr16_plant *plant, double t, const double *x, double *in, double *qdd)
+{
+    double extra[6], *tau = in + 18;
+    add_wrench(plant, t, in, tau);
     if (plant->stops) {
         kr16_contact(plant, x, x + 6, extra);
         for (int i = 0; i < 6; i++)
@@ -87,22 +99,43 @@ void kr16_accelerate(kr16_plant *plant, double t, const double *x, const double 
         for (int i = 0; i < 6; i++)
             tau[i] -= extra[i];
     }
-    memcpy(in, cs, 12 * sizeof *in);
-    memcpy(in + 12, x + 6, 6 * sizeof *in);
-    memcpy(in + 18, tau, 6 * sizeof *in);
-    kr16_forward_dynamics(plant->p, in, qdd);
+    if (plant->sparse)
+        kr16_forward_dynamics(plant->p, in, qdd);
+    else
+        solved(plant->p, in, qdd);
 }
 
+/* Rates at x, whose cosines and sines stand in `in`. */
+static int rates(kr16_plant *plant, double t, const double *x, double *in, double *dx)
+{
+    const int status = kr16_asked(plant, t, x, in, in + 18);
+    if (status != FINE)
+        return status;
+    kr16_applied(plant, x + 6, in + 18);
+    for (int i = 0; i < 6; i++)
+        in[12 + i] = dx[i] = x[6 + i];
+    accelerate(plant, t, x, in, dx + 6);
+    return FINE;
+}
+
+int kr16_plant_rates_at(kr16_plant *plant, double t, const double *x, const double *cs, double *dx)
+{
+    double in[24];
+    memcpy(in, cs, 12 * sizeof *in);
+    return rates(plant, t, x, in, dx);
+}
+
+/* Each method asks first for the rates where its step begins. */
 int kr16_plant_rates(void *context, double t, const double *x, double *dx)
 {
     kr16_plant *plant = context;
-    double cs[12], tau[6];
-    kr16_trig(x, cs);
-    const int status = kr16_asked(plant, t, x, cs, tau);
-    if (status != FINE)
-        return status;
-    kr16_applied(plant, x + 6, tau);
-    memcpy(dx, x + 6, 6 * sizeof *dx);
-    kr16_accelerate(plant, t, x, cs, tau, dx + 6);
-    return FINE;
+    double in[24];
+    if (plant->known) {
+        plant->known = 0;
+        memcpy(dx, x + 6, 6 * sizeof *dx);
+        memcpy(dx + 6, plant->qdd, sizeof plant->qdd);
+        return FINE;
+    }
+    kr16_trig(x, in);
+    return rates(plant, t, x, in, dx);
 }

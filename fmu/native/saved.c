@@ -5,7 +5,7 @@
 #include "kr16_fmu.h"
 
 typedef struct {
-    uint64_t zero, build, check;
+    uint64_t zero, build, check, kind;
     kr16_core core;
 } saved;
 
@@ -23,6 +23,17 @@ static uint64_t build(void)
     const size_t size = sizeof(saved);
     return hash(hash(14695981039346656037u, &size, sizeof size), kr16_robot.token,
                 sizeof kr16_robot.token);
+}
+
+static uint64_t checked(const saved *s)
+{
+    return hash(hash(s->build, &s->kind, sizeof s->kind), &s->core, sizeof s->core);
+}
+
+/* What an instance was made for; its phases are not those of another kind. */
+static uint64_t kind(const kr16_instance *instance)
+{
+    return (uint64_t)(instance->model_exchange != 0) + 2u * (uint64_t)(instance->event_mode != 0);
 }
 
 size_t kr16_state_size(void)
@@ -47,6 +58,7 @@ int kr16_save(kr16_instance *instance, void **state)
     if (!s && !(s = calloc(1, sizeof *s)))
         return kr16_fail(instance, "getFMUState: out of memory");
     s->build = build();
+    s->kind = kind(instance);
     memcpy(&s->core, &instance->core, sizeof s->core);
     *state = s;
     return OK;
@@ -57,6 +69,9 @@ int kr16_restore(kr16_instance *instance, const void *state)
     const saved *s = state;
     if (usable(instance, s, "setFMUState") != OK)
         return ERROR;
+    if (s->kind != kind(instance))
+        return kr16_fail(instance, "setFMUState: the state is of an instance of another kind: of "
+                                   "model exchange, of co-simulation, or of that with events");
     memcpy(&instance->core, &s->core, sizeof s->core);
     return OK;
 }
@@ -80,7 +95,7 @@ int kr16_write_state(kr16_instance *instance, const void *state, void *bytes, si
                          bytes ? (unsigned long)size : 0ul, (unsigned long)sizeof *s);
     memset(bytes, 0, size);
     memcpy(bytes, s, sizeof *s);
-    const uint64_t check = hash(s->build, &s->core, sizeof s->core);
+    const uint64_t check = checked(s);
     memcpy((char *)bytes + offsetof(saved, check), &check, sizeof check);
     return OK;
 }
@@ -94,7 +109,7 @@ int kr16_read_state(kr16_instance *instance, const void *bytes, size_t size, voi
         return kr16_fail(instance, "deserializeFMUState: out of memory");
     if (bytes && size >= sizeof *s)
         memcpy(s, bytes, sizeof *s);
-    if (s->zero != 0 || s->build != build() || s->check != hash(s->build, &s->core, sizeof s->core)) {
+    if (s->zero != 0 || s->build != build() || s->check != checked(s)) {
         free(s);
         return kr16_fail(instance, "deserializeFMUState: the %lu bytes are no state of this build "
                                    "of the FMU", bytes ? (unsigned long)size : 0ul);

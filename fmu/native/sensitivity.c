@@ -1,4 +1,6 @@
 /* Directional and adjoint derivatives as FMI asks for them, and derivatives of outputs by time. */
+#include <math.h>
+
 #include "kr16_fmu.h"
 
 /* The entry of an unknown, or of a known, if it may be one. */
@@ -21,7 +23,7 @@ static const kr16_entry *entry_of(kr16_instance *instance, const char *call, uns
               known ? "%s: no derivatives by %s; by states and inputs, and by q_start and qd_start "
                       "before the initialization ends"
                     : "%s: no derivatives of %s; of outputs and derivatives of type Real",
-              call, kr16_slots[slot].name);
+              call, kr16_name_of(slot).text);
     return NULL;
 }
 
@@ -60,6 +62,16 @@ static int measure(kr16_instance *instance, const kr16_request *r, size_t *unkno
     return OK;
 }
 
+static int all_finite(kr16_instance *instance, const char *call, const char *what,
+                      const double *values, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        if (!isfinite(values[i]))
+            return kr16_fail(instance, "%s: %s number %lu is %g; it must be finite", call, what,
+                             (unsigned long)i + 1, values[i]);
+    return OK;
+}
+
 static int sizes_fit(kr16_instance *instance, const kr16_request *r, size_t seeds, size_t results)
 {
     if (r->seed_count != seeds || r->result_count != results)
@@ -68,7 +80,7 @@ static int sizes_fit(kr16_instance *instance, const kr16_request *r, size_t seed
                          (unsigned long)seeds, (unsigned long)results);
     if ((seeds && !r->seeds) || (results && !r->results))
         return kr16_fail(instance, "%s: seeds or sensitivities are missing (NULL)", r->call);
-    return OK;
+    return all_finite(instance, r->call, "seed", r->seeds, seeds);
 }
 
 int kr16_directional(kr16_instance *instance, const kr16_request *r)
@@ -92,7 +104,7 @@ int kr16_directional(kr16_instance *instance, const kr16_request *r)
         for (int i = 0; i < entry->count; i++)
             r->results[place++] = change[entry->slot + i];
     }
-    return OK;
+    return all_finite(instance, r->call, "sensitivity", r->results, place);
 }
 
 /* Seeds times the change of the unknowns along one number of a known. */
@@ -125,7 +137,7 @@ int kr16_adjoint(kr16_instance *instance, const kr16_request *r)
             r->results[place++] = dotted(r, change);
         }
     }
-    return OK;
+    return all_finite(instance, r->call, "sensitivity", r->results, place);
 }
 
 int kr16_output_rises(kr16_instance *instance, const unsigned *references, size_t n,
@@ -154,5 +166,5 @@ int kr16_output_rises(kr16_instance *instance, const unsigned *references, size_
         for (int i = 0; i < entry->count; i++)
             values[place++] = change[entry->slot + i];
     }
-    return OK;
+    return all_finite(instance, call, "derivative", values, place);
 }

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "kr16_fmu.h"
+#include "tape.h"
 
 #define ROUNDING 1e-12
 
@@ -57,7 +58,7 @@ static int check_payload(kr16_instance *instance, const double *value)
 
 static void pack(const double *value, double *p)
 {
-    double x[97] = {0.0};
+    double x[97] = {0.0}, none[KR16_PARAMETERS] = {0.0};
     memcpy(x, kr16_robot.geometry, sizeof kr16_robot.geometry);
     memcpy(x + 6, kr16_robot.links, sizeof kr16_robot.links);
     if (value[SLOT_PAYLOAD_MASS] != 0.0)
@@ -65,7 +66,17 @@ static void pack(const double *value, double *p)
     memcpy(x + 76, value + SLOT_GRAVITY_X, 3 * sizeof *x);
     if (value[SLOT_DRIVES] != 0.0) /* rotors, then both frictions */
         memcpy(x + 79, value + SLOT_ROTOR_INERTIA, 18 * sizeof *x);
-    kr16_parameters(NULL, x, p);
+    kr16_along(&kr16_parameters_tape, none, x, none, p, NULL);
+    kr16_keep(p, NULL, p + KR16_PARAMETERS);
+}
+
+static int is_sparse(const double *p)
+{
+    static const uint8_t zeros[] = KR16_ZEROS;
+    for (size_t k = 0; k < sizeof zeros; k++)
+        if (p[zeros[k]] != 0.0)
+            return 0;
+    return 1;
 }
 
 static void gains(kr16_plant *plant, const double *value)
@@ -94,6 +105,7 @@ static int set_up(kr16_instance *instance)
         return ERROR;
     memset(plant, 0, sizeof *plant);
     pack(value, plant->p);
+    plant->sparse = is_sparse(plant->p);
     plant->drives = value[SLOT_DRIVES] != 0.0;
     plant->stops = value[SLOT_LIMITS_JOINT] == 2.0;
     plant->mode = (int)value[SLOT_CONTROL_MODE];

@@ -5,6 +5,10 @@
 #include "kr16_fmu.h"
 #include "ode.h"
 
+/* Of the adaptive method in a communication step: smaller or more ones lead nowhere. */
+#define LEAST_STEP 1e-12
+#define MOST_STEPS 1000000
+
 /* Semi-implicit Euler, order 1: new speeds move the angles. */
 static int euler(kr16_plant *plant, double t, double h, double *x)
 {
@@ -101,8 +105,11 @@ static int dormand_prince(kr16_plant *plant, double t, double h, double *x, doub
     int status = kr16_dp54_start(&s, kr16_plant_rates, plant, t, x);
     if (*hint > 0.0)
         s.h = *hint;
-    while (status == FINE && s.t < t + h)
+    while (status == FINE && s.t < t + h) {
         status = kr16_dp54_step(&s, kr16_plant_rates, plant, t + h);
+        if (s.steps > MOST_STEPS || (s.h < LEAST_STEP * h && s.t < t + h))
+            return STEP_VANISHED;
+    }
     if (status != FINE)
         return status == KR16_ODE_TOO_SMALL ? STEP_VANISHED : status;
     *hint = s.h;

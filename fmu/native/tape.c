@@ -6,11 +6,20 @@
 
 #include "trig.h"
 
+/* The place of an argument of the operation at `place`. */
+static int argument(const uint8_t **code, int far, int place)
+{
+    const uint8_t *c = *code;
+    *code += far ? 2 : 1;
+    return far ? c[0] | c[1] << 8 : place - c[0];
+}
+
 void kr16_along(const kr16_tape *tape, const double *p, const double *x, const double *dx,
-                double *dy)
+                double *y, double *dy)
 {
     double v[KR16_TAPE_PLACES], d[KR16_TAPE_PLACES];
-    int place = KR16_PARAMETERS, chosen;
+    const uint8_t *code = tape->code;
+    int place = KR16_PARAMETERS, condition = 0;
     memcpy(v, p, KR16_PARAMETERS * sizeof *v);
     memset(d, 0, sizeof *d * (size_t)(KR16_PARAMETERS + tape->inputs + tape->constant_count));
     memcpy(v + place, x, (size_t)tape->inputs * sizeof *v);
@@ -19,10 +28,12 @@ void kr16_along(const kr16_tape *tape, const double *p, const double *x, const d
     memcpy(v + place, tape->constants, (size_t)tape->constant_count * sizeof *v);
     place += tape->constant_count;
     for (int k = 0; k < tape->length; k++, place++) {
-        const uint32_t step = tape->code[k], first = step >> 12 & 0xfffu, second = step & 0xfffu;
+        const int byte = *code++, operation = byte & 15;
+        const int first = argument(&code, byte & 16, place);
+        const int second = operation < TAPE_ALONE ? argument(&code, byte & 32, place) : first;
         const double a = v[first], da = d[first], b = v[second], db = d[second];
         double value = 0.0, slope = 0.0;
-        switch (step >> 24) {
+        switch (operation) {
         case TAPE_ADD:
             value = a + b;
             slope = da + db;
@@ -65,18 +76,22 @@ void kr16_along(const kr16_tape *tape, const double *p, const double *x, const d
         case TAPE_LE:
             value = a <= b;
             break;
-        case TAPE_WHERE: /* where (a) b else what the next line names */
+        case TAPE_WHERE: /* where (a) b else what the next operation names */
+            condition = a != 0.0;
             value = b;
             slope = db;
             break;
         default: /* TAPE_ELSE */
-            chosen = v[tape->code[k - 1] >> 12 & 0xfffu] != 0.0;
-            value = chosen ? v[place - 1] : a;
-            slope = chosen ? d[place - 1] : da;
+            value = condition ? v[place - 1] : a;
+            slope = condition ? d[place - 1] : da;
         }
         v[place] = value;
         d[place] = slope;
     }
-    for (int k = 0; k < tape->results; k++)
-        dy[k] = d[tape->ends[k]];
+    for (int k = 0; k < tape->results; k++) {
+        if (y)
+            y[k] = v[tape->ends[k]];
+        if (dy)
+            dy[k] = d[tape->ends[k]];
+    }
 }

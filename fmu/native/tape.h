@@ -3,8 +3,9 @@
 
 #include "kr16_model.h"
 
-/* Results dy of a tape at x with parameters p, along the direction dx: exact. */
+/* Results y of a tape at x with parameters p, and how they change along the direction dx, dy:
+ * exact. What is not wanted may be NULL. */
 void kr16_along(const kr16_tape *tape, const double *p, const double *x, const double *dx,
-                double *dy);
+                double *y, double *dy);
 
 #endif

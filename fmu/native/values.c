@@ -6,6 +6,9 @@
 #include "kr16_fmu.h"
 
 static const char *const kinds[] = {"Real", "Integer", "Boolean"};
+static const char *const groups[] = {
+    [GROUP_QDD] = "qdd",       [GROUP_TAU_APPLIED] = "tau_applied", [GROUP_POSE] = "pose",
+    [GROUP_ENERGY] = "energy", [GROUP_TAU_WANTED] = "tau",          [GROUP_MARGIN] = "margin"};
 
 static const kr16_entry *find(kr16_instance *instance, const char *call, unsigned reference)
 {
@@ -55,22 +58,27 @@ static void flags(int group, double before, const double *x, const double *tau, 
 }
 
 /* One group of outputs into its slots. */
-static int computed(kr16_plant *plant, double t, const double *x, int group, double before,
-                    double *value)
+static int computed(kr16_core *core, int group, double before)
 {
-    double cs[12], tau[6], in[36];
+    kr16_plant *plant = &core->plant;
+    double *value = core->value, tau[6], in[36];
+    const double t = value[SLOT_TIME], *x = value + SLOT_Q, *cs = core->cs;
     int status = FINE;
-    kr16_trig(x, cs);
-    if (group == GROUP_QDD || group == GROUP_TAU_APPLIED || group == GROUP_TAU_WANTED ||
-        group == GROUP_LIMIT_TORQUE || group == GROUP_MARGIN)
+    if (!(core->fresh & 1u) && group != GROUP_LIMIT_POSITION && group != GROUP_LIMIT_SPEED) {
+        kr16_trig(x, core->cs);
+        core->fresh |= 1u << GROUP_NONE;
+    }
+    if (group == GROUP_TAU_APPLIED || group == GROUP_TAU_WANTED || group == GROUP_LIMIT_TORQUE ||
+        group == GROUP_MARGIN)
         status = kr16_asked(plant, t, x, cs, tau);
     if (status != FINE)
         return status;
     switch (group) {
     case GROUP_QDD:
-        kr16_applied(plant, x + 6, tau);
-        kr16_accelerate(plant, t, x, cs, tau, value + SLOT_QDD);
-        break;
+        status = kr16_plant_rates_at(plant, t, x, cs, in);
+        if (status == FINE)
+            memcpy(value + SLOT_QDD, in + 6, 6 * sizeof *in);
+        return status;
     case GROUP_TAU_APPLIED:
         kr16_applied(plant, x + 6, tau);
         memcpy(value + SLOT_TAU_APPLIED, tau, sizeof tau);
@@ -97,6 +105,23 @@ static int computed(kr16_plant *plant, double t, const double *x, int group, dou
     return FINE;
 }
 
+/* Whether what was computed are numbers; huge inputs and states give none. */
+static int in_range(const double *value, int group)
+{
+    static const struct {
+        uint8_t first, count;
+    } places[] = {[GROUP_QDD] = {SLOT_QDD, 6},
+                  [GROUP_TAU_APPLIED] = {SLOT_TAU_APPLIED, 6},
+                  [GROUP_POSE] = {SLOT_POSE_X, 6},
+                  [GROUP_ENERGY] = {SLOT_ENERGY_KINETIC, 2},
+                  [GROUP_TAU_WANTED] = {SLOT_TAU_WANTED, 6},
+                  [GROUP_MARGIN] = {SLOT_MARGIN_LOWER, 24}};
+    double sum = 0.0;
+    for (int i = 0; i < places[group].count; i++)
+        sum += value[places[group].first + i] - value[places[group].first + i];
+    return sum == 0.0;
+}
+
 int kr16_compute(kr16_instance *instance, int group)
 {
     kr16_core *core = &instance->core;
@@ -104,38 +129,64 @@ int kr16_compute(kr16_instance *instance, int group)
         return OK;
     if (kr16_ready(instance) != OK)
         return ERROR;
-    const int status = computed(&core->plant, core->value[SLOT_TIME], core->value + SLOT_Q, group,
-                                early(instance), core->value);
+    const int status = computed(core, group, early(instance));
     if (status != FINE)
         return kr16_fail(instance,
                          "the orientation error has a pitch of %.4g deg, 90 deg is singular; start "
                          "nearer to the reference or move it more slowly",
                          core->plant.pitch * 57.29577951308232);
+    if (!in_range(core->value, group))
+        return kr16_fail(instance, "at %.6g s %s leaves the range of numbers; the inputs or the "
+                                   "states are too large", core->value[SLOT_TIME], groups[group]);
     core->fresh |= 1u << group;
     return OK;
 }
 
-int kr16_look(kr16_instance *instance, const char *call, unsigned reference, unsigned want,
-              const double **values, size_t *count)
+static int wrong_type(kr16_instance *instance, const char *call, int slot)
 {
-    const kr16_entry *entry = find(instance, call, reference);
-    if (!entry)
-        return ERROR;
-    const kr16_slot *slot = &kr16_slots[entry->slot];
-    if (!(want >> slot->kind & 1u))
-        return kr16_fail(instance, "%s: %s is of type %s", call, slot->name, kinds[slot->kind]);
-    if (slot->group && kr16_compute(instance, slot->group) != OK)
-        return ERROR;
-    *values = instance->core.value + entry->slot;
-    *count = entry->count;
+    return kr16_fail(instance, "%s: %s is of type %s", call, kr16_name_of(slot).text,
+                     kinds[kr16_slots[slot].kind]);
+}
+
+int kr16_take(kr16_instance *instance, const char *call, const unsigned *references, size_t n,
+              unsigned want, int type, void *values, size_t count)
+{
+    size_t used = 0;
+    if (n && (!references || !values))
+        return kr16_fail(instance, "%s: references or values are missing (NULL)", call);
+    for (size_t k = 0; k < n; k++) {
+        const kr16_entry *entry = find(instance, call, references[k]);
+        if (!entry)
+            return ERROR;
+        const kr16_slot *slot = &kr16_slots[entry->slot];
+        if (!(want >> slot->kind & 1u))
+            return wrong_type(instance, call, entry->slot);
+        if (slot->group && kr16_compute(instance, slot->group) != OK)
+            return ERROR;
+        if (entry->count > count - used)
+            return kr16_fail(instance, "%s: room for %lu values is too little", call,
+                             (unsigned long)count);
+        for (int i = 0; i < entry->count; i++, used++) {
+            const double value = instance->core.value[entry->slot + i];
+            if (type == AS_DOUBLE)
+                ((double *)values)[used] = value;
+            else if (type == AS_INT)
+                ((int *)values)[used] = (int)value;
+            else
+                ((bool *)values)[used] = value != 0.0;
+        }
+    }
+    if (used != count)
+        return kr16_fail(instance, "%s: room for %lu values; there are %lu", call,
+                         (unsigned long)count, (unsigned long)used);
     return OK;
 }
 
 static double number(int type, const void *values, size_t place)
 {
-    if (type == FROM_DOUBLE)
+    if (type == AS_DOUBLE)
         return ((const double *)values)[place];
-    if (type == FROM_INT)
+    if (type == AS_INT)
         return ((const int *)values)[place];
     return ((const bool *)values)[place];
 }
@@ -144,37 +195,44 @@ static double number(int type, const void *values, size_t place)
 static int may_set(kr16_instance *instance, const char *call, const kr16_entry *entry,
                    unsigned want)
 {
-    const kr16_slot *slot = &kr16_slots[entry->slot];
-    const int phase = instance->core.phase;
-    if (!(want >> slot->kind & 1u))
-        return kr16_fail(instance, "%s: %s is of type %s", call, slot->name, kinds[slot->kind]);
+    const int phase = instance->core.phase, slot = entry->slot;
+    const char *reason = NULL;
+    if (!(want >> kr16_slots[slot].kind & 1u))
+        return wrong_type(instance, call, slot);
     if (phase == TERMINATED || phase == FAILED)
         return kr16_fail(instance, "%s: %s cannot be set: the instance is %s; reset", call,
-                         slot->name, kr16_phase(instance));
-    if (entry->causality != INPUT && entry->causality != PARAMETER)
-        return kr16_fail(instance, "%s: %s is no input and no parameter; it cannot be set", call,
-                         slot->name);
-    if (entry->variability == FIXED && phase > INITIALIZING)
-        return kr16_fail(instance,
-                         "%s: %s is fixed; set it before the initialization ends, or reset", call,
-                         slot->name);
-    if (entry->causality == PARAMETER && phase == CONTINUOUS_TIME)
-        return kr16_fail(instance, "%s: %s can only be set at events", call, slot->name);
-    return OK;
+                         kr16_name_of(slot).text, kr16_phase(instance));
+    if (entry->causality == INPUT)
+        return OK;
+    /* In model exchange some hosts set states by their references. */
+    if (instance->model_exchange && (phase == EVENT || phase == CONTINUOUS_TIME) &&
+        entry->slot >= SLOT_Q && entry->slot < SLOT_Q + STATES)
+        return OK;
+    if (entry->causality != PARAMETER)
+        reason = "is no input and no parameter; it cannot be set";
+    else if (entry->variability == FIXED && phase > INITIALIZING)
+        reason = "is fixed; set it before the initialization ends, or reset";
+    else if (phase == CONTINUOUS_TIME)
+        reason = "can only be set at events";
+    if (!reason)
+        return OK;
+    return kr16_fail(instance, "%s: %s %s", call, kr16_name_of(slot).text, reason);
 }
 
 static int makes_sense(kr16_instance *instance, const char *call, const kr16_entry *entry,
                        double value)
 {
     const kr16_slot *slot = &kr16_slots[entry->slot];
+    const kr16_range *range = &kr16_ranges[slot->range];
     if (slot->kind == BOOLEAN)
         return OK;
     if (!isfinite(value))
-        return kr16_fail(instance, "%s: %s = %g: must be a finite number", call, slot->name, value);
-    const kr16_range *range = &kr16_ranges[slot->range];
+        return kr16_fail(instance, "%s: %s = %g: must be a finite number", call,
+                         kr16_name_of(entry->slot).text, value);
     if (!(range->low <= value && value <= range->high))
-        return kr16_fail(instance, "%s: %s = %g %s: must be %g to %g", call, slot->name, value,
-                         range->unit, range->low, range->high);
+        return kr16_fail(instance, "%s: %s = %g %s: must be %g to %g", call,
+                         kr16_name_of(entry->slot).text, value, range->unit, range->low,
+                         range->high);
     return OK;
 }
 
@@ -230,13 +288,13 @@ int kr16_input_rises(kr16_instance *instance, const unsigned *references, size_t
         if (!entry || may_set(instance, call, entry, WANT_REAL) != OK)
             return ERROR;
         if (entry->causality != INPUT)
-            return kr16_fail(instance, "%s: %s is no input", call, kr16_slots[entry->slot].name);
+            return kr16_fail(instance, "%s: %s is no input", call, kr16_name_of(entry->slot).text);
         if (orders[k] != 1)
             return kr16_fail(instance, "%s: order %d of %s; only the first is used", call,
-                             orders[k], kr16_slots[entry->slot].name);
+                             orders[k], kr16_name_of(entry->slot).text);
         if (!isfinite(values[k]))
             return kr16_fail(instance, "%s: derivative %g of %s; it must be finite", call,
-                             values[k], kr16_slots[entry->slot].name);
+                             values[k], kr16_name_of(entry->slot).text);
     }
     for (size_t k = 0; k < n; k++) {
         const int slot = kr16_robot.entry[references[k] - 1u].slot;

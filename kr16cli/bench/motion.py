@@ -1,31 +1,26 @@
-"""Motions from Python: a right-hand side in SciPy beside Pinocchio's, and steps of the FMU."""
+"""Motions: a right-hand side in SciPy beside Pinocchio's, and the FMUs."""
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from kr16cli.api import Robot
-from kr16cli.bench.rollouts import START, STEP, TOLERANCE, Figure, pinocchio_rates
+from kr16cli.bench import fmus
+from kr16cli.bench.rollouts import START, TOLERANCE, Figure, pinocchio_rates
 from kr16cli.bench.timing import least
-from kr16cli.errors import MissingPartError
 
 METHODS = ("RK45", "DOP853")
 
-_MODES = {"torques": 1, "computed torque": 4, "task space": 5}
-"""What the FMU's drives do: control.mode."""
-
 
 def measure(robot: Robot, rounds: int, duration: float = 10.0) -> list[Figure]:
-    """Free swings in SciPy (s), and what the FMU costs (s), if FMPy and pythonfmu are here.
+    """Free swings in SciPy (s), and what the FMUs cost (s), if FMPy is here.
 
     Least time of `rounds`, the contenders taking turns.
     """
-    return [*_swings(robot, rounds, duration), *_fmu(robot, rounds)]
+    return [*_swings(robot, rounds, duration), *fmus.measure(robot, rounds)]
 
 
 def _swings(robot: Robot, rounds: int, duration: float) -> Iterator[Figure]:
@@ -64,30 +59,6 @@ def _own(robot: Robot) -> Rates:
 def _pinocchio(robot: Robot) -> dict[str, Rates]:
     rates = pinocchio_rates(robot)
     return {} if rates is None else {"Pinocchio's ABA": rates}
-
-
-def _fmu(robot: Robot, rounds: int) -> Iterator[Figure]:
-    """A step of 1 ms through FMPy, and opening with instantiating, NumPy imported before."""
-    from kr16cli.fmi import build, choices, compiling, play
-    from kr16cli.fmi.variables import Part
-
-    compiler = compiling.find_compiler()
-    options, _ = choices.options(robot.data, None, Part.ROBOT, compiler)
-    with tempfile.TemporaryDirectory(prefix="kr16_bench_") as folder:
-        path = Path(folder) / "KR16.fmu"
-        opened = []
-        try:
-            path.write_bytes(build.build(robot.data, options))
-            for name, mode in _MODES.items():
-                values = {"control.mode": mode}
-                answer = play.ask(
-                    "times", fmu=str(path), step=STEP, rounds=rounds, start_values=values
-                )
-                opened.append(answer["open"])
-                yield Figure(f"FMU (pythonfmu), doStep of 1 ms, {name}", answer["step"], {})
-        except MissingPartError:
-            return
-        yield Figure("FMU (pythonfmu), open and instantiate", min(opened), {})
 
 
 def lines(figures: Sequence[Mapping[str, Any]]) -> list[str]:

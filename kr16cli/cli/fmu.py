@@ -1,4 +1,4 @@
-"""kr16 fmu build, info, check, run."""
+"""kr16 fmu build, ssp, info, check, run, table."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typer import Context
 
 from kr16cli.cli import fmus as f
 from kr16cli.cli import fmus_native as n
+from kr16cli.cli import fmus_table as t
 from kr16cli.cli.command import Command, LeanGroup, new_app
 from kr16cli.cli.options import Json, Output, Robot
 
 app = new_app(cls=LeanGroup)
-
 app.callback()(f.group)
 
 
@@ -27,14 +27,8 @@ def build(ctx: Context, output: f.Built = "KR16.fmu", scenario: f.Scene = None,
     (n if native else f).build(ctx)
 
 
-@app.command(cls=Command)
-def info(file: f.File, json: Json = False) -> None:
-    """What an FMU is, and its variables.
-
-    $ kr16 fmu build
-    $ kr16 fmu info KR16.fmu
-    """
-    f.info(file, json=json)
+app.command(cls=Command)(n.ssp)
+app.command(cls=Command)(f.info)
 
 
 @app.command(cls=Command)
@@ -57,3 +51,6 @@ def run(ctx: Context, file: f.File, source: f.Signals = None, output: Output = N
     $ kr16 fmu run KR16.fmu --set control.mode=2 --stop 0.5 -o out.csv
     """
     f.run(ctx)
+
+
+app.command(cls=Command)(t.table)

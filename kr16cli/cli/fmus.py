@@ -11,6 +11,7 @@ import typer
 from kr16cli.cli import batch, render, values
 from kr16cli.cli import output as out
 from kr16cli.cli import run as runs
+from kr16cli.cli.options import Json
 from kr16cli.errors import CheckFailedError, InputError
 
 File = Annotated[str, typer.Argument(metavar="FILE", help="An FMU.")]
@@ -51,7 +52,7 @@ Values = Annotated[
 
 
 def group() -> None:
-    """Build, look into, check and run FMUs (FMI 2.0, co-simulation).
+    """Build, look into, check and run FMUs of the robot, and a system of them (SSP).
 
     $ kr16 fmu build
     $ kr16 fmu check KR16.fmu
@@ -66,6 +67,7 @@ def build(ctx: typer.Context) -> None:
     from kr16cli.simulate.scenario import load_scenario
 
     p = ctx.params
+    file_only(p["output"], "an FMU", "KR16.fmu")
     with out.Target(p["output"]) as target:
         data = runs.load(ctx)
         scenario = load_scenario(p["scenario"]) if p["scenario"] else None
@@ -84,12 +86,21 @@ def build(ctx: typer.Context) -> None:
             "several times slower"
         )
     batch.warn(notes)
-    if p["output"] != "-":
-        print(f"{p['output']}: {part} of {data.name}, FMI 2.0, {len(content)} bytes")
+    print(f"{p['output']}: {part} of {data.name}, FMI 2.0, {len(content)} bytes")
 
 
-def info(file: str, *, json: bool) -> None:
-    """Print what an FMU is."""
+def file_only(output: str, what: str, example: str) -> None:
+    """Refuse standard output for what is no text."""
+    if output == "-":
+        raise InputError(f"{what} is binary and needs a file; give -o {example}")
+
+
+def info(file: File, json: Json = False) -> None:
+    """What an FMU is, and its variables.
+
+    $ kr16 fmu build
+    $ kr16 fmu info KR16.fmu
+    """
     from kr16cli.fmi import reading
 
     answer = reading.envelope(reading.read(file))

@@ -1,4 +1,4 @@
-"""`kr16 fmu build --native`: its options, and what it does with them."""
+"""`kr16 fmu build --native` and `kr16 fmu ssp`: their options, and what they do with them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import typer
 from kr16cli.cli import batch
 from kr16cli.cli import output as out
 from kr16cli.cli import run as runs
+from kr16cli.cli.fmus import file_only
+from kr16cli.cli.options import Robot
 from kr16cli.errors import InputError
 
 Native = Annotated[
@@ -29,6 +31,22 @@ Platforms = Annotated[
 ]  # fmt: skip
 
 
+System = Annotated[str, typer.Option("--output", "-o", metavar="FILE", help="The SSP to write.")]
+Motion = Annotated[
+    str,
+    typer.Option(
+        "--scenario", metavar="SCENARIO",
+        help="A file or shipped scenario with a reference and a controller that follows it.",
+    ),
+]  # fmt: skip
+Targets = Annotated[
+    str,
+    typer.Option(
+        "--platforms", metavar="WHICH", help="host, all (needs ziglang), or names with commas."
+    ),
+]
+
+
 def build(ctx: typer.Context) -> None:
     """Write the native FMU and say what it is."""
     from kr16cli.fmi import choices
@@ -44,6 +62,7 @@ def build(ctx: typer.Context) -> None:
     if p["arrays"] and version == 2:
         raise InputError("--arrays needs --fmi 3; FMI 2 has no arrays")
     names = platforms(p["platforms"], version)
+    file_only(p["output"], "an FMU", "KR16.fmu")
     with out.Target(p["output"]) as target:
         data = runs.load(ctx)
         scenario = load_scenario(p["scenario"]) if p["scenario"] else None
@@ -56,8 +75,32 @@ def build(ctx: typer.Context) -> None:
         content = builder.build(data, own)
         target.write(content)
     batch.warn(notes)
-    if p["output"] != "-":
-        print(
-            f"{p['output']}: {part} of {data.name}, FMI {version}.0, native for "
-            f"{', '.join(names)}, {len(content)} bytes"
-        )
+    print(
+        f"{p['output']}: {part} of {data.name}, FMI {version}.0, native for "
+        f"{', '.join(names)}, {len(content)} bytes"
+    )
+
+
+def ssp(ctx: typer.Context, output: System = "cell.ssp", scenario: Motion = "ptp_16kg",
+        platforms: Targets = "host", robot: Robot = None) -> None:  # fmt: skip
+    """Build a system of native FMUs: trajectory source, controller and robot, connected (SSP 1.0).
+
+    $ kr16 fmu ssp -o cell.ssp
+    $ kr16 fmu ssp --scenario circle_task_space -o circle.ssp
+    """
+    from kr16cli.fmi.native import ssp as builder
+    from kr16cli.fmi.native.library import platforms as named
+    from kr16cli.simulate.scenario import load_scenario
+
+    names = named(platforms, 2)
+    file_only(output, "an SSP", "cell.ssp")
+    with out.Target(output) as target:
+        cell = builder.cell(runs.load(ctx), load_scenario(scenario))
+        content = builder.package(cell, names)
+        target.write(content)
+    batch.warn(cell.notes)
+    print(
+        f"{output}: {cell.scenario.name} by trajectory, controller and robot of "
+        f"{cell.data.name}, SSP 1.0, native for {', '.join(names)}, {len(content)} bytes; "
+        f"run it for {cell.scenario.duration:g} s in steps of {cell.step:g} s"
+    )

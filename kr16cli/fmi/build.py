@@ -9,7 +9,6 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
-from html import escape
 from importlib import metadata
 from pathlib import Path
 from types import ModuleType
@@ -17,10 +16,10 @@ from typing import Any, NamedTuple
 
 from kr16cli.assets import asset
 from kr16cli.errors import CheckFailedError, MissingPartError
-from kr16cli.fmi import packing, quick, shim, stage, written
+from kr16cli.fmi import packing, pages, quick, shim, stage, written
 from kr16cli.fmi.cargo import Cargo
 from kr16cli.fmi.description import guid
-from kr16cli.fmi.variables import TYPES, Part, Start, Variable, table
+from kr16cli.fmi.variables import Part, Start, table
 from kr16cli.robot import RobotData
 
 MODEL = "KR16"
@@ -67,7 +66,7 @@ def build(data: RobotData, options: Options) -> bytes:
         stop=options.stop, step=options.step, tool=f" with PythonFMU {version}",
     )  # fmt: skip
     cargo = Cargo(about, table(data, options.start, options.part), data)
-    slave, pages = _shipped()
+    slave, shipped = _shipped()
     files = stage.contents(cargo, written.python(), slave)
     library = shim.compiled(options.compiler) if options.compiler else b""
     module = quick.compiled(options.compiler) if options.compiler else b""
@@ -77,7 +76,7 @@ def build(data: RobotData, options: Options) -> bytes:
         script = stage.stage(
             here / "resources", files, digest, {quick.MODULE: module} if module else {}
         )
-        documentation = _documentation(here / "documentation", pages, cargo, digest)
+        documentation = _documentation(here / "documentation", shipped, cargo, digest)
         made = here / f"{MODEL}.fmu"
         with _as_before(script), _builder(home) as builder:
             builder.build_FMU(
@@ -157,36 +156,24 @@ def _shipped() -> tuple[str, Mapping[str, bytes]]:
     """Text of the slave, files of the documentation; read once, as `stage.closure` is."""
     root = asset("fmu/documentation")
     files = sorted(path for path in root.rglob("*") if path.is_file())
-    pages = {path.relative_to(root).as_posix(): path.read_bytes() for path in files}
-    return asset("fmu/kr16_slave.py").read_text(encoding="utf-8"), pages
+    found = {path.relative_to(root).as_posix(): path.read_bytes() for path in files}
+    return asset("fmu/kr16_slave.py").read_text(encoding="utf-8"), found
 
 
-def _documentation(folder: Path, pages: Mapping[str, bytes], cargo: Cargo, digest: str) -> Path:
+def _documentation(folder: Path, shipped: Mapping[str, bytes], cargo: Cargo, digest: str) -> Path:
     """The FMU's documentation folder: a page with the variables, and licences."""
-    for name, content in pages.items():
+    for name, content in shipped.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)
     page = folder / "index.html"
     texts = {"identity": digest, **{key: str(value) for key, value in cargo.about.items()}}
     text = page.read_text(encoding="utf-8")
-    for key, value in texts.items():
-        text = text.replace(f"{{{{{key}}}}}", escape(value))
-    rows = "\n".join(map(_row, cargo.variables))
-    page.write_bytes(text.replace("{{variables}}", rows).encode())
+    page.write_bytes(pages.filled(text, texts, map(pages.row, cargo.variables)))
     for file in metadata.files("pythonfmu") or ():
         if file.name.upper().startswith("LICENSE"):
             content = Path(str(file.locate())).read_bytes()
             (folder / "licenses" / "pythonfmu.txt").write_bytes(content)
     return folder
-
-
-def _row(v: Variable) -> str:
-    kind = TYPES[v.type]
-    start = (
-        "" if v.start is None else str(v.start).lower() if kind.base != "Real" else f"{v.start:.6g}"
-    )
-    cells = (v.name, v.causality, v.variability, kind.unit or kind.base, start, v.description)
-    return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"
 
 
 def _packed(made: Path, library: bytes, identity: str) -> bytes:

@@ -52,7 +52,8 @@ def simulate(job: dict[str, Any]) -> dict[str, Any]:
             job["fmu"], validate=False, start_time=0.0, stop_time=job["stop"],
             output_interval=job["step"], start_values=job["start_values"],
             input=_signals(job), output=job["outputs"], logger=_messages(warnings, errors),
-            debug_logging=True, fmi_type=job["kind"],
+            debug_logging=True, fmi_type=job["kind"], relative_tolerance=job["tolerance"],
+            record_events=False,
         )  # fmt: skip
     except Exception as error:
         return {"failure": " ".join([*str(error).split(), *errors[:1]])}
@@ -72,17 +73,27 @@ def states(job: dict[str, Any]) -> dict[str, Any]:
     import shutil
 
     import fmpy
-    from fmpy.fmi2 import FMU2Slave
+    from fmpy import fmi2, fmi3
 
     description = fmpy.read_model_description(job["fmu"], validate=False)
     folder = fmpy.extract(job["fmu"])
+    third = description.fmiVersion.startswith("3")
+    make: Any = fmi3.FMU3Slave if third else fmi2.FMU2Slave
+    save, restore, write, read, get = (
+        ("getFMUState", "setFMUState", "serializeFMUState", "deserializeFMUState", "getFloat64")
+        if third
+        else ("getFMUstate", "setFMUstate", "serializeFMUstate", "deSerializeFMUstate", "getReal")
+    )
     references = [v.valueReference for v in description.modelVariables
-                  if v.causality == "output" and v.type == "Real"]  # fmt: skip
+                  if v.causality == "output" and v.type in ("Real", "Float64")]  # fmt: skip
     h, differing = job["step"], []
 
     def begin(slave: Any) -> None:
-        slave.setupExperiment(startTime=0.0)
-        slave.enterInitializationMode()
+        if third:
+            slave.enterInitializationMode(startTime=0.0)
+        else:
+            slave.setupExperiment(startTime=0.0)
+            slave.enterInitializationMode()
         slave.exitInitializationMode()
         for k in range(10):
             slave.doStep(k * h, h)
@@ -90,24 +101,24 @@ def states(job: dict[str, Any]) -> dict[str, Any]:
     def go_on(slave: Any) -> Any:
         for k in range(10, 20):
             slave.doStep(k * h, h)
-        return slave.getReal(references)
+        return getattr(slave, get)(references)
 
     try:
         first, second = (
-            FMU2Slave(guid=description.guid, unzipDirectory=folder, instanceName=name,
-                      modelIdentifier=description.coSimulation.modelIdentifier)
+            make(guid=description.guid, unzipDirectory=folder, instanceName=name,
+                 modelIdentifier=description.coSimulation.modelIdentifier)
             for name in ("first", "second")
         )  # fmt: skip
         for slave in (first, second):
             slave.instantiate()
         begin(first)
-        state = first.getFMUstate()
-        content = first.serializeFMUstate(state)
+        state = getattr(first, save)()
+        content = getattr(first, write)(state)
         expected = go_on(first)
-        first.setFMUstate(state)
+        getattr(first, restore)(state)
         if go_on(first) != expected:
             differing.append("a state set back")
-        second.setFMUstate(second.deSerializeFMUstate(content))
+        getattr(second, restore)(getattr(second, read)(content))
         if go_on(second) != expected:
             differing.append("a state serialized and set in another instance")
         first.terminate()
@@ -125,53 +136,11 @@ def states(job: dict[str, Any]) -> dict[str, Any]:
     return {"differing": differing}
 
 
-def times(job: dict[str, Any]) -> dict[str, Any]:
-    """Seconds to open and instantiate, NumPy imported before, and the least of a doStep."""
-    import shutil
-    from time import perf_counter
-
-    import fmpy
-    import numpy as np
-    from fmpy.fmi2 import FMU2Slave
-
-    np.zeros(1)  # what it takes to import NumPy is the host's affair
-    begin = perf_counter()
-    description = fmpy.read_model_description(job["fmu"], validate=False)
-    folder = fmpy.extract(job["fmu"])
-    try:
-        slave = FMU2Slave(
-            guid=description.guid, unzipDirectory=folder, instanceName="timed",
-            modelIdentifier=description.coSimulation.modelIdentifier,
-        )  # fmt: skip
-        slave.instantiate()
-        opened = perf_counter() - begin
-        known = {v.name: v for v in description.modelVariables}
-        values = dict(job["start_values"])
-        values |= {f"q_ref[{i}]": float(known[f"q_start[{i}]"].start) for i in range(1, 7)}
-        for name, value in values.items():
-            variable = known[name]
-            getattr(slave, f"set{variable.type}")([variable.valueReference], [value])
-        slave.setupExperiment(startTime=0.0)
-        slave.enterInitializationMode()
-        slave.exitInitializationMode()
-        h, count, least = job["step"], 200, float("inf")
-        for k in range(2 + job["rounds"]):
-            begin = perf_counter()
-            for n in range(count):
-                slave.doStep((count * k + n) * h, h)
-            least = min(least, (perf_counter() - begin) / count)
-        slave.terminate()
-        slave.freeInstance()
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    return {"open": opened, "step": least}
-
-
 def main() -> None:
     """Do the job on stdin."""
     sys.meta_path.insert(0, _Closed())
     job = json.load(sys.stdin)
-    jobs = {"simulate": simulate, "validate": validate, "states": states, "times": times}
+    jobs = {"simulate": simulate, "validate": validate, "states": states}
     answer = jobs[job["do"]](job)
     with open(job["answer"], "w", encoding="utf-8") as file:  # noqa: PTH123
         json.dump(answer, file)

@@ -5,12 +5,14 @@ from __future__ import annotations
 from kr16cli.fmi.build import Options
 from kr16cli.fmi.variables import LIMITS, MODES, Part, Start
 from kr16cli.robot import Payload, RobotData
+from kr16cli.simulate.motion_spec import ControllerSpec
 from kr16cli.simulate.scenario import Scenario, SolverSpec
 from kr16cli.units import rad
 
 _BENT: tuple[float, ...] = tuple(map(rad, (0.0, -60.0, 60.0, 0.0, 30.0, 0.0)))
 """Where an FMU without scenario starts: away from every singularity, B from its pole as well."""
 
+_DAMPED = (ControllerSpec("task_space").near, ControllerSpec("task_space").strength)
 _KNOWN = {name: number for number, (name, _) in enumerate(MODES, 1)}
 _METHODS = {"RK4": 2, "SemiImplicitEuler": 3}
 _STOPS = {name: number for number, (name, _) in enumerate(LIMITS, 1)}
@@ -40,6 +42,8 @@ def options(
         notes += _unsaid(controller.sampling is not None, "the controller's sampling")
         notes += _unsaid(not controller.knows_payload, "a controller that ignores the payload")
         notes += _unsaid(controller.kp is not None, "gains kp, kd; it takes the frequency")
+        damped = (controller.near, controller.strength)
+        notes += _unsaid(damped != _DAMPED, "near_singular and singular_damping; it takes its own")
     notes += _unsaid(torque.kind == "csv", "the torque file; connect it to tau")
     notes += _unsaid(scenario.reference is not None, "the reference; connect it to q_ref, qd_ref")
     notes += _unsaid(scenario.wrench is not None, "the wrench; connect it to wrench")

@@ -69,7 +69,7 @@ def model_description(
     })  # fmt: skip
     listed = SubElement(root, "ModelVariables")
     for place, variable in enumerate(variables):
-        listed.append(_variable(place, variable))
+        listed.append(variable_element(place, variable))
     structure = SubElement(root, "ModelStructure")
     for tag, start in (("Outputs", False), ("InitialUnknowns", True)):
         unknowns = SubElement(structure, tag)
@@ -114,7 +114,8 @@ def units_of(kind: Type) -> dict[str, str]:
     return {key: value for key, value in found.items() if value}
 
 
-def _variable(place: int, variable: Variable) -> Element:
+def variable_element(place: int, variable: Variable) -> Element:
+    """The ScalarVariable of a variable with the value reference `place`."""
     attributes = {
         "name": variable.name, "valueReference": str(place), "description": variable.description,
         "causality": variable.causality, "variability": variable.variability,

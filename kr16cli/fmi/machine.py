@@ -203,7 +203,7 @@ class Machine:
         if not (math.isfinite(size) and size > 0.0):
             raise InputError(f"communication step {size} s: must be a positive number")
         slack = _SLACK * max(1.0, abs(time), abs(self.time))
-        if not abs(time - self.time) <= max(slack, 1e-6 * size):
+        if not (math.isfinite(time) and abs(time - self.time) <= max(slack, 1e-6 * size)):
             raise InputError(
                 f"communication point {time} s: the instance stands at {self.time} s; go on from "
                 "there, or set back its state first"

@@ -28,16 +28,24 @@ class Signals:
 
 
 def play(
-    fmu: Fmu, signals: Signals, stop: float, step: float, start_values: Mapping[str, float]
+    fmu: Fmu,
+    signals: Signals,
+    stop: float,
+    step: float,
+    start_values: Mapping[str, float],
+    kind: str = "",
+    tolerance: float | None = None,
 ) -> tuple[dict[str, list[float]], list[str]]:
     """Simulate an FMU from 0 to `stop` (s) with a communication step of `step` (s).
 
     Args:
-        fmu: the FMU; co-simulation is preferred.
+        fmu: the FMU.
         signals: inputs, straight lines between their rows, held beyond the last.
         stop: end, s.
         step: communication step, s.
         start_values: of parameters, by name.
+        kind: one of `fmu.kinds`; where none is given, co-simulation is preferred.
+        tolerance: relative, of FMPy's solver in model exchange; FMPy's own where none is given.
 
     Returns:
         Columns by name, `time` first, then the outputs; and what the FMU warned of.
@@ -52,7 +60,8 @@ def play(
     answer = ask(
         "simulate", fmu=str(Path(fmu.path).resolve()), stop=stop, step=step, outputs=outputs,
         times=list(signals.times), inputs={k: list(v) for k, v in signals.columns.items()},
-        start_values=_typed(fmu, start_values), kind=_kind(fmu),
+        start_values=_typed(fmu, start_values), tolerance=tolerance,
+        kind="".join(part.capitalize() for part in (kind or interface(fmu)).split("-")),
     )  # fmt: skip
     if "failure" in answer:
         raise CheckFailedError(f"{fmu.path}: the run failed: {answer['failure']}")
@@ -62,10 +71,6 @@ def play(
 def interface(fmu: Fmu) -> str:
     """The kind of FMU it is run as: co-simulation where it offers that, else its first."""
     return "co-simulation" if "co-simulation" in fmu.kinds else "".join(fmu.kinds[:1])
-
-
-def _kind(fmu: Fmu) -> str:
-    return "".join(part.capitalize() for part in interface(fmu).split("-"))
 
 
 def _typed(fmu: Fmu, values: Mapping[str, float]) -> dict[str, Any]:

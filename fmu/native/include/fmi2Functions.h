@@ -160,10 +160,16 @@ This definition has been changed to always export the symbols.
 
 
 /* 
-Macro to construct the real function name.
-This definition has been changed to add no prefix.
+Macros to construct the real function name
+(prepend function name by FMI2_FUNCTION_PREFIX) 
 */
-#define fmi2FullName(name) name
+#if defined(FMI2_FUNCTION_PREFIX)
+  #define fmi2Paste(a,b)     a ## b
+  #define fmi2PasteB(a,b)    fmi2Paste(a,b)
+  #define fmi2FullName(name) fmi2PasteB(FMI2_FUNCTION_PREFIX, name)
+#else
+  #define fmi2FullName(name) name
+#endif
 
 
 /***************************************************

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from kr16cli.kernels.trace import Node, needed
 
@@ -14,10 +14,24 @@ CALLS = {"sqrt": "sqrt", "atan2": "kr16_angle", "sin": "kr16_sin", "cos": "kr16_
 _LEAVES = frozenset({"constant", "input", "parameter"})
 
 
-def function(name: str, comment: str, results: Sequence[Node]) -> str:
-    """`void name(const double *p, const double *x, double *y)`: parameters, inputs, results."""
-    body = [_statement(node) for node in ordered(results)]
-    store = [f"    y[{i}] = {_name(node)};" for i, node in enumerate(results)]
+def function(
+    name: str,
+    comment: str,
+    results: Sequence[Node],
+    kept: Mapping[int, int] | None = None,
+    *,
+    quick: bool = True,
+) -> str:
+    """`void name(const double *p, const double *x, double *y)`: parameters, inputs, results.
+
+    `kept` are places in p of nodes, by their numbers, that are there and not computed again.
+    Operations are listed for a processor not to wait, or, if not `quick`, as the model does
+    them, which makes a fifth less code.
+    """
+    there = kept or {}
+    nodes = ordered(results, there) if quick else _computed(results, there)
+    body = [f"    {_typed(n)} = {_expression(n, there)};" for n in nodes]
+    store = [f"    y[{i}] = {_name(node, there)};" for i, node in enumerate(results)]
     head = f"void {name}(const double *restrict p, const double *restrict x, double *restrict y)"
     nodes = needed(results)
     unused = [
@@ -28,13 +42,13 @@ def function(name: str, comment: str, results: Sequence[Node]) -> str:
     return "\n".join([f"/* {comment} */", head, "{", *unused, *body, *store, "}", ""])
 
 
-def ordered(results: Sequence[Node]) -> list[Node]:
-    """The operations in an order in which a processor need not wait much.
+def ordered(results: Sequence[Node], kept: Mapping[int, int] | None = None) -> list[Node]:
+    """The operations in an order in which a processor need not wait much, without those kept.
 
     The longest chain of operations decides the time of such code, and a processor looks ahead
     only some hundred operations: so each step takes, of what is ready, what the most depends on.
     """
-    nodes = [n for n in needed(results) if n.op not in _LEAVES]
+    nodes = _computed(results, kept or {})
     users: dict[int, list[Node]] = {n.number: [] for n in nodes}
     for node in nodes:
         for argument in node.args:
@@ -46,6 +60,18 @@ def ordered(results: Sequence[Node]) -> list[Node]:
         height[node.number] = rest + _LATENCY.get(node.op, 4)
     waits = {n.number: sum(a.number in users for a in n.args) for n in nodes}
     return _listed(nodes, users, height, waits)
+
+
+def _computed(results: Sequence[Node], kept: Mapping[int, int]) -> list[Node]:
+    """The operations that are needed where some nodes are there already, as the model has them."""
+    wanted: set[int] = set()
+    stack = list(results)
+    while stack:
+        node = stack.pop()
+        if node.number not in wanted and node.number not in kept:
+            wanted.add(node.number)
+            stack.extend(node.args)
+    return [n for n in needed(results) if n.number in wanted and n.op not in _LEAVES]
 
 
 _LATENCY = {"div": 14, "sqrt": 18, "neg": 1, "lt": 4, "le": 4, "where": 2, "atan2": 80,
@@ -81,7 +107,9 @@ def _listed(
     return found
 
 
-def _name(node: Node) -> str:
+def _name(node: Node, kept: Mapping[int, int]) -> str:
+    if node.number in kept:
+        return f"p[{kept[node.number]}]"
     if node.op == "constant":
         text = repr(node.value)
         return f"({text})" if node.value < 0 else text
@@ -90,13 +118,12 @@ def _name(node: Node) -> str:
     return f"v{node.number}"
 
 
-def _statement(node: Node) -> str:
-    kind = "int" if node.op in ("lt", "le") else "double"
-    return f"    const {kind} v{node.number} = {_expression(node)};"
+def _typed(node: Node) -> str:
+    return f"const {'int' if node.op in ('lt', 'le') else 'double'} v{node.number}"
 
 
-def _expression(node: Node) -> str:
-    args = [_name(a) for a in node.args]
+def _expression(node: Node, kept: Mapping[int, int]) -> str:
+    args = [_name(a, kept) for a in node.args]
     if node.op in _INFIX:
         return f"{args[0]} {_INFIX[node.op]} {args[1]}"
     if node.op == "neg":

@@ -7,7 +7,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 from kr16cli.fmi.description import LOG, guid, unit_element, units_of, word
-from kr16cli.fmi.native import depend, slots
+from kr16cli.fmi.native import depend, documents, slots
 from kr16cli.fmi.native.table import DERIVATIVES, Item
 from kr16cli.fmi.variables import TYPES, UNITS, Part, Type
 
@@ -70,7 +70,8 @@ def describe(name: str, identity: str, about: Mapping[str, Any], listed: Sequenc
 
 
 def _type(name: str, kind: Type) -> Element:
-    element = Element(_BASES[kind.base] + "Type", {"name": name, "description": kind.description})
+    # Without a description: older FMPy, which other hosts build on, fails at one.
+    element = Element(_BASES[kind.base] + "Type", {"name": name})
     if kind.quantity:
         element.set("quantity", kind.quantity)
     element.attrib |= units_of(kind)
@@ -83,7 +84,7 @@ def _variable(item: Item, places: Mapping[str, int], *, robot: bool) -> Element:
     v, kind = item.first, TYPES[item.first.type]
     element = Element(_BASES[kind.base], {
         "name": item.name, "valueReference": str(places[item.name]),
-        "description": _text(item), "causality": v.causality, "variability": v.variability,
+        "description": documents.text(item), "causality": v.causality, "variability": v.variability,
     })  # fmt: skip
     if v.causality == "parameter":
         element.set("initial", "exact")
@@ -107,16 +108,6 @@ def _variable(item: Item, places: Mapping[str, int], *, robot: bool) -> Element:
     if len(item.members) > 1:
         SubElement(element, "Dimension", {"start": str(len(item.members))})
     return element
-
-
-def _text(item: Item) -> str:
-    """The description; of an array, that of its first with all joints in place of one."""
-    text = item.first.description
-    if len(item.members) == 1:
-        return text
-    last = item.members[-1].description
-    pairs = list(zip(text.split(" "), last.split(" "), strict=False))
-    return " ".join(a if a == b else f"{a}..{b}" for a, b in pairs)
 
 
 def _structure(listed: Sequence[Item], places: Mapping[str, int], *, robot: bool) -> Element:

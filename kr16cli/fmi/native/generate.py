@@ -1,11 +1,13 @@
-"""Write the C of the native FMU's library: `python -m kr16cli.fmi.native.generate FOLDER`.
+"""Write the C of the native FMUs' libraries: `python -m kr16cli.fmi.native.generate FOLDER`.
 
-For the build of the package. The robot inside is replaced when an FMU is built.
+For the build of the package. The robot inside is replaced when an FMU is built, and so is the
+motion of the trajectory source, whose C goes into FOLDER/track.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from kr16cli.fmi.native import numbers, sources, table
@@ -21,14 +23,18 @@ def generic() -> numbers.Table:
     return numbers.table(data, entries, Part.ROBOT, "", sources.digest())
 
 
-def write(folder: Path) -> None:
+def write(folder: Path, files: Mapping[str, str]) -> None:
     """All files into a folder; those that have not changed are left alone."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, text in sources.complete(generic()).items():
+    for name, text in files.items():
         file = folder / name
         if not file.is_file() or file.read_text(encoding="utf-8") != text:
             file.write_text(text, encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":
-    write(Path(sys.argv[1]))
+    from kr16cli.fmi.native import track_fmu
+
+    target = Path(sys.argv[1])
+    write(target, sources.complete(generic()))
+    write(target / "track", track_fmu.generic())

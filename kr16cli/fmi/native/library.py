@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
-from functools import lru_cache
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from kr16cli.errors import CheckFailedError, FileError, InputError
 from kr16cli.fmi.compiling import find_compiler
@@ -44,7 +44,29 @@ def platforms(text: str, version: int) -> tuple[str, ...]:
     return tuple(dict.fromkeys(chosen))
 
 
-def libraries(table: numbers.Table, names: Sequence[str], version: int) -> dict[str, bytes]:
+class Made(NamedTuple):
+    """What a library is made of.
+
+    `complete` is its C; `generic` gives the same before a robot or a motion is in, which is `own`
+    as bytes. `file` is the name of the library that the package may bring, `digest` of its C.
+    """
+
+    file: str
+    digest: str
+    own: bytes
+    complete: Mapping[str, str]
+    generic: Callable[[], Mapping[str, str]]
+
+
+def of_robot(table: numbers.Table) -> Made:
+    """The library of a robot or its controller."""
+    return Made(
+        MODEL, sources.digest(), numbers.as_bytes(table), sources.complete(table),
+        lambda: sources.complete(generic()),
+    )  # fmt: skip
+
+
+def libraries(made: Made, names: Sequence[str], version: int) -> dict[str, bytes]:
     """The library of each platform by its path in an FMU.
 
     The one of this machine comes ready from the package where it was built with it.
@@ -58,44 +80,54 @@ def libraries(table: numbers.Table, names: Sequence[str], version: int) -> dict[
         target = toolchain.TARGETS[name]
         folder = target.folder2 if version == 2 else target.folder3
         path = f"binaries/{folder}/{MODEL}{target.suffix}"
-        made = _library(table, name)
-        found[path] = _universal((found[path], made)) if path in found else made
+        content = _library(made, name)
+        found[path] = _universal((found[path], content)) if path in found else content
     return found
 
 
-def _library(table: numbers.Table, name: str) -> bytes:
+def _library(made: Made, name: str) -> bytes:
     """One library. The numbers are put into a compiled one, which so is the same for every robot.
 
     But macOS runs no library that was changed after it was signed.
     """
     if toolchain.TARGETS[name].suffix == ".dylib":
-        return toolchain.compiled(sources.complete(table), name, None)
-    made = numbers.put_in(_generic(name), table)
-    if made is None:
-        raise CheckFailedError(f"the library for {name} has no place for a robot; update zig")
-    return made
+        return toolchain.compiled(made.complete, name, None)
+    key = (made.file, name)
+    if key not in _GENERIC:
+        _GENERIC[key] = _generic(made, name)
+    content = numbers.put_in(_GENERIC[key], made.own)
+    if content is None:
+        raise CheckFailedError(f"the library for {name} has no place for its numbers; update zig")
+    return content
 
 
-@lru_cache(maxsize=len(toolchain.TARGETS))
-def _generic(name: str) -> bytes:
+_GENERIC: dict[tuple[str, str], bytes] = {}
+"""Libraries that were compiled, by what they are and the platform."""
+
+
+def _generic(made: Made, name: str) -> bytes:
     """The library of a platform before a robot is put in."""
     own = name == toolchain.host()
-    ready = prebuilt() if own else None
-    files = sources.complete(generic())
-    return ready or toolchain.compiled(files, name, find_compiler() if own else None)
+    ready = prebuilt(made.file, made.digest) if own else None
+    return ready or toolchain.compiled(made.generic(), name, find_compiler() if own else None)
 
 
-def prebuilt() -> bytes | None:
-    """This machine's library as the package brought it; None if there is none of this version."""
+def prebuilt(file: str = MODEL, digest: str | None = None) -> bytes | None:
+    """This machine's library as the package brought it; None if there is none of this version.
+
+    Args:
+        file: its name, without suffix.
+        digest: of the C it must be of; None for that of a robot.
+    """
     host = toolchain.host()
     if host is None or toolchain.TARGETS[host].suffix == ".dylib":
         return None
-    file = _HERE / f"{MODEL}{toolchain.TARGETS[host].suffix}"
+    path = _HERE / f"{file}{toolchain.TARGETS[host].suffix}"
     try:
-        content = file.read_bytes() if file.is_file() else b""
+        content = path.read_bytes() if path.is_file() else b""
     except OSError as error:
-        raise FileError(file, f"cannot be read: {error.strerror}; reinstall kr16cli") from None
-    return content if sources.digest().encode() in content else None
+        raise FileError(path, f"cannot be read: {error.strerror}; reinstall kr16cli") from None
+    return content if (digest or sources.digest()).encode() in content else None
 
 
 def _universal(parts: Sequence[bytes]) -> bytes:

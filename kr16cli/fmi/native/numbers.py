@@ -147,8 +147,11 @@ def as_bytes(content: Table) -> bytes:
     return b"".join(parts)
 
 
-def put_in(library: bytes, content: Table) -> bytes | None:
-    """A compiled library with the table in place of its own; None if its C is another."""
-    own = as_bytes(content)
+def put_in(library: bytes, content: Table | bytes) -> bytes | None:
+    """A compiled library with the table in place of its own; None if its C is another.
+
+    A table of bytes is any that begins with a mark of 16 bytes and the hash of its C.
+    """
+    own = content if isinstance(content, bytes) else as_bytes(content)
     at = library.find(own[: len(MARK) + 64])
     return None if at < 0 else library[:at] + own + library[at + len(own) :]

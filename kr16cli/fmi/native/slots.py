@@ -112,13 +112,19 @@ def header() -> Iterator[str]:
         yield f'    {{{_number(low)}, {_number(high)}, "{unit}"}}, \\'
     yield "}"
     yield ""
-    yield "/* Name, kind, group and range of each slot. */"
+    stems = list(dict.fromkeys(v.name.partition("[")[0] for v in slots()))
+    yield "/* Kind, group, range and name of each slot. */"
     yield "#define KR16_SLOT_ROWS { \\"
     for v in slots():
         name = outputs.group(v.name)
         group = GROUPS.index(name) + 1 if name in GROUPS else 0
         codes = KINDS.index(v.base), group, ranges.index(_range(v))
-        yield f'    {{"{v.name}", {", ".join(map(str, codes))}}}, \\'
+        yield f"    {{{', '.join(map(str, codes))}, {stems.index(v.name.partition('[')[0])}}}, \\"
+    yield "}"
+    yield ""
+    yield f"#define KR16_STEM {max(map(len, stems)) + 1}"
+    yield "#define KR16_STEM_ROWS { \\"
+    yield from (f'    "{stem}", \\' for stem in stems)
     yield "}"
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
-from kr16cli.fmi.native import cwrite, slots, tape
+from kr16cli.fmi.native import cwrite, slots, stepped, tape
 from kr16cli.fmi.stiff import GAMMA, STEP
 from kr16cli.kernels.parameters import COUNT, Parameters, flatten, unpack
 from kr16cli.kernels.quantities import QUANTITIES, flat
@@ -43,12 +43,7 @@ def _of_model(name: str) -> Callable[..., Flat]:
 
 
 def _forward_dynamics(k: Parameters, cs: Trig, qd: Any, tau: Any, _: Functions) -> Flat:
-    """`dynamics.forward_dynamics`, solved from joint 6 on: its row is the first to be known."""
-    rest = dynamics.bias(cs, qd, k.base, k.geometry, k.gravity)
-    matrix = dynamics.mass_matrix(cs, k.base, k.geometry, k.rotors)
-    turned = [row[::-1] for row in matrix[::-1]]
-    right = [t - b for t, b in zip(tau, rest, strict=True)][::-1]
-    return dynamics.solve_symmetric(turned, right)[::-1]
+    return stepped.solved(k, cs, qd, tau)
 
 
 def _friction(k: Parameters, qd: Any, ns: Functions) -> Flat:
@@ -155,8 +150,8 @@ FUNCTIONS = {
 }  # fmt: skip
 
 
-TAPES = ("inverse_dynamics", "friction", "pose", "motion", "task")
-"""Functions that derivatives are taken of; the others' follow from these."""
+TAPES = ("inverse_dynamics", "friction", "pose", "motion", "task", "parameters")
+"""Functions that derivatives are taken of, the others' follow from these; and one run rarely."""
 
 
 def trace(function: Function) -> list[Node]:
@@ -171,6 +166,12 @@ def trace(function: Function) -> list[Node]:
         arguments.append(list(zip(row[:6], row[6:], strict=True)) if width == TRIG else row)
     results = function.results(k, *arguments, graph.functions())
     return [graph.lift(value) for value in results]
+
+
+def _printed() -> dict[str, Function]:
+    """All but what `stepped` prints, and what is a tape only."""
+    other = ("forward_dynamics", "parameters")
+    return {name: f for name, f in FUNCTIONS.items() if name not in other}
 
 
 def model_h() -> str:
@@ -199,14 +200,14 @@ def model_h() -> str:
         *slots.header(),
         "",
     ]
-    for name, function in FUNCTIONS.items():
+    for name, function in _printed().items():
         widths = ", ".join(f"{what} {n}" for what, n in function.inputs)
         lines += [
             f"/* {function.comment}: x is {widths}; y is {len(trace(function))}. */",
             f"void kr16_{name}(const double *restrict p, const double *restrict x, "
             "double *restrict y);",
         ]
-    lines += ["", *tape.header(TAPES, max(_tape(name)[1] for name in TAPES))]
+    lines += ["", *stepped.header(), "", *tape.header(TAPES, max(_tape(name)[1] for name in TAPES))]
     return "\n".join([*lines, "", "#endif", ""])
 
 
@@ -220,10 +221,16 @@ def model_c() -> str:
     head = ["/* Written by kr16cli from its model; do not edit. */", "#include <math.h>", "",
             '#include "kr16_model.h"', '#include "trig.h"', ""]  # fmt: skip
     texts = [
-        cwrite.function(f"kr16_{name}", function.comment, trace(function))
-        for name, function in FUNCTIONS.items()
+        cwrite.function(f"kr16_{name}", function.comment, trace(function), quick=False)
+        for name, function in _printed().items()
     ]
     return "\n".join([*head, *texts])
+
+
+def stepped_c() -> str:
+    """The functions that take most of the time of a step."""
+    head = ["/* Written by kr16cli from its model; do not edit. */", '#include "kr16_model.h"', ""]
+    return "\n".join([*head, *stepped.functions()])
 
 
 def tapes_c() -> str:
