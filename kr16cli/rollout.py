@@ -202,6 +202,24 @@ def rollout(
     )
 
 
+def numbers_of(robot: Robot, variation: Variation, count: int) -> Array:
+    """The numbers of `count` robots as the kernels take them, `kernels.parameters.flatten`.
+
+    Args:
+        robot: what they have in common.
+        variation: what differs, each field (count, ...).
+        count: how many.
+
+    Returns:
+        (count, `kernels.parameters.COUNT`), SI units.
+
+    Raises:
+        InputError: as `rollout`.
+    """
+    numbers = _numbers(robot, _checked_variation(variation), (count,))[0]
+    return np.broadcast_to(numbers, (count, COUNT))
+
+
 # Arguments ------------------------------------------------------------------------------------
 
 

@@ -91,6 +91,7 @@ def test_pictures_of_little_are_drawn_too(tmp_path):
         ("map reach --grid 0", ("--grid", "more than 0")),
         ("map reach --grid 1e-9", ("--grid", "points along x")),
         ("map reach --grid fine", ("--grid", "number")),
+        ("map reach --grid 10cm", ("--grid is 10cm", "mm or m")),
         ("map reach --x 500:100", ("--x", "empty")),
         ("map reach --x 1:2:3", ("--x", "LOW:HIGH")),
         ("map reach --orientation up", ("--orientation", "fixed, list or free")),
@@ -111,6 +112,14 @@ def test_bad_input_is_one_line(words, told, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     complains(kr16(words), *told)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_map_of_nothing_says_so():
+    done = kr16("map reach --grid 500 --y 9000 --json")
+    assert done.code == 0
+    (warning,) = done.json()["warnings"]
+    assert "nothing is reached within the joint limits" in warning
+    assert warning in done.err
 
 
 def test_without_a_quantity_the_help_is_shown():

@@ -19,7 +19,7 @@ def test_a_sweep_is_told_and_written(tmp_path):
     assert done.out.splitlines()[0] == ("Free swing: KUKA KR 16-2, 4 runs, factorial, 0 failed")
     with file.open(newline="") as source:
         rows = list(csv.DictReader(source))
-    assert [row["payload.mass"] for row in rows] == ["0.0", "8.0", "0.0", "8.0"]
+    assert [row["payload.mass [kg]"] for row in rows] == ["0.0", "8.0", "0.0", "8.0"]
     assert {row["status"] for row in rows} == {"ok"}
     assert [p.name for p in tmp_path.iterdir()] == ["s.csv"]
 

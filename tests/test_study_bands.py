@@ -32,7 +32,7 @@ def test_the_band_of_a_controlled_run_holds_drawn_robots(run: Run, tmp_path: Any
     file.write_bytes(run.to_npz())
     bands = of_run(DATA, load_run(file))
     assert bands.half is not None and bands.half.shape == run.tau.shape
-    assert "95 % of the torque" in bands.words and "link 4, link 5, link 6" in bands.words
+    assert "95 % of the torque" in bands.words and "exact" not in bands.words
     placed = DATA.with_gravity((1.0, 0.0, -9.0))
     sources = uncertain(placed, drives=True)
     load = Payload(16.0, (0.0, 0.0, 0.12), (0.36, 0.36, 0.36, 0.0, 0.0, 0.0))
@@ -48,7 +48,7 @@ def test_the_band_of_a_controlled_run_holds_drawn_robots(run: Run, tmp_path: Any
     )
     within = np.abs(torques - middle) <= bands.half[pick] + 1e-9
     wide = bands.half[pick] > 1e-6
-    assert wide[:, :3].any()
+    assert wide.any(axis=0).all()
     share = within.mean(axis=0)[wide]
     assert share.min() > 0.9 and share.max() < 0.99
 
@@ -68,7 +68,7 @@ def test_long_motions_are_banded_at_some_samples(run: Run) -> None:
     pick = [0, 7, 700, 1500]
     few = of_motion(DATA, q[pick], qd[pick], qdd[pick]).half
     assert long is not None and few is not None
-    assert long[pick] == pytest.approx(few, rel=1e-4, abs=1e-9)
+    assert long[pick] == pytest.approx(few, rel=1e-3, abs=1e-9)
 
 
 @pytest.mark.parametrize(

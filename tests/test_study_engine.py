@@ -244,6 +244,31 @@ def test_a_full_disk_ends_the_run_and_keeps_what_is_finished(tmp_path, monkeypat
     same(whole(Toy()), whole(Toy(), output))
 
 
+_FULL = """
+import resource, signal, sys
+resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+sys.path[:0] = {paths!r}
+from kr16cli.__main__ import main
+sys.argv = ["kr16", "map", "reach", "--grid", "200", "-o", {output!r}]
+sys.exit(main())
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="limits of files are POSIX")
+def test_files_that_may_not_grow_are_told_and_nothing_is_left(tmp_path):
+    paths = [str(Path(kr16cli.__file__).resolve().parent.parent)]
+    script = _FULL.format(paths=paths, output=str(tmp_path / "m.npz"))
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
+                          check=False)  # fmt: skip
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("kr16: error:")
+    assert "m.npz.partial: cannot be written: File too large" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_study_that_cannot_fit_is_refused_at_once(tmp_path):
     with pytest.raises(FileError, match=r"needs .* GB on this disk, .* are free"):
         whole(Toy(rows=10**14, chunk_rows=10**9), tmp_path / "out.npz")

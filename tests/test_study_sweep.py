@@ -15,7 +15,7 @@ from kr16cli.simulate.scenario import load_scenario, with_options
 from kr16cli.study import sweep_facts, tables
 from kr16cli.study.design import Design, design, variable
 from kr16cli.study.engine import Local
-from kr16cli.study.paths import changed, find, known
+from kr16cli.study.paths import changed, find, known, unit_of
 from kr16cli.study.session import finished
 from kr16cli.study.sweep import FIGURES, figures, sweep_of
 
@@ -23,9 +23,9 @@ FILE = load_data().path
 SHORT = "duration_s=0.1,0.2"
 
 
-def a_sweep(*vary, scenario="free_swing", latin=None, monte_carlo=None, seed=1):
+def a_sweep(*vary, scenario="free_swing", latin=None, monte_carlo=None, seed=1, simulator=False):
     plan = design(vary, latin=latin, monte_carlo=monte_carlo, seed=seed)
-    return sweep_of(FILE, scenario, plan)
+    return sweep_of(FILE, scenario, plan, simulator=simulator)
 
 
 def whole(work, **options):
@@ -34,8 +34,9 @@ def whole(work, **options):
 
 
 def test_a_row_is_the_simulation_with_those_numbers():
-    work = a_sweep("payload.mass=0,10", "duration_s=0.1,0.2", "link[2].mass=x1.1")
+    work = a_sweep("payload.mass=0,10", "duration_s=0.1,0.2", "link[2].mass=x1.1", simulator=True)
     rows = whole(work)
+    assert set(rows["engine"]) == {"simulator"}
     assert rows["payload.mass"].tolist() == [0.0, 0.0, 10.0, 10.0]
     assert rows["duration_s"].tolist() == [0.1, 0.2, 0.1, 0.2]
     assert set(rows["status"]) == {"ok"}
@@ -49,7 +50,7 @@ def test_a_row_is_the_simulation_with_those_numbers():
 
 
 def test_an_unvaried_row_is_the_scenario_itself():
-    rows = whole(a_sweep("link[1].mass=x1"))
+    rows = whole(a_sweep("link[1].mass=x1", simulator=True))
     told = figures(simulate(load_data(), load_scenario("free_swing")), load_data())
     for name, column in FIGURES.items():
         for i in range(column.shape[0] if column.shape else 1):
@@ -59,7 +60,7 @@ def test_an_unvaried_row_is_the_scenario_itself():
 
 
 def test_processes_give_the_same_table():
-    work = a_sweep("initial.q_deg[2]=-60:60:9", "duration_s=0.05")
+    work = a_sweep("initial.q_deg[2]=-60:60:9", "duration_s=0.05", simulator=True)
     here, there = whole(work), whole(work, runner=Local(2))
     for name, values in here.items():
         assert values.tobytes() == there[name].tobytes()
@@ -86,6 +87,31 @@ def test_a_path_to_a_list_moves_all_of_it():
     place = work.places[0]
     assert place.value == [20000, 20000, 10000, 2000, 2000, 100]
     assert known(work.tables).count("controller.kp[6]") == 1
+
+
+def test_a_number_that_sources_disagree_on_can_be_varied():
+    work = a_sweep("geometry.d6=0.115,0.2", "duration_s=0.02")
+    assert work.case([0.2, 0.02]).data.conflicts == ()
+    assert "0.158" in work.base.data.conflicts[0]
+    assert set(whole(work)["status"]) == {"ok"}
+
+
+@pytest.mark.parametrize(
+    ("path", "unit"),
+    [
+        ("payload.mass", "kg"),
+        ("initial.q_deg[3]", "deg"),
+        ("initial.qd_deg_s", "deg/s"),
+        ("gravity[2]", "m/s2"),
+        ("link[2].com[1]", "m"),
+        ("joint[4].viscous_nms", "N m s/rad"),
+        ("solver.rtol", ""),
+        ("duration_s", "s"),
+    ],
+)
+def test_a_varied_number_has_its_unit(path, unit):
+    assert unit_of(a_sweep("duration_s=0.1").tables, path) == unit
+    assert a_sweep(f"{path}=x1").columns()[path].unit == "factor"
 
 
 def test_no_payload_is_a_payload_of_no_mass():
@@ -209,6 +235,7 @@ def test_a_bad_run_is_marked_and_others_go_on():
     assert "must be > 0" in rows["status"][1]
     assert np.isnan(rows["q_end_1"][1])
     assert rows["limits_passed"][1] == -1
+    assert rows["engine"].tolist() == ["rollout", ""]
 
 
 def test_tables_hold_the_same_numbers_in_every_format(tmp_path):
@@ -231,7 +258,7 @@ def test_tables_hold_the_same_numbers_in_every_format(tmp_path):
             assert table["q_end_2"][i].as_py() == value
             assert rows[i]["error_position [m]"] == ""
             assert table["error_position"][i].as_py() is None
-    assert rows[2]["payload.mass"] == "16.0"
+    assert rows[2]["payload.mass [kg]"] == "16.0"
 
 
 def test_rank_correlations_tell_what_matters():

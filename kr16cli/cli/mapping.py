@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kr16cli.cli import render, studies, values
+from kr16cli.cli import batch, render, studies, values
 from kr16cli.errors import InputError
 
 if TYPE_CHECKING:
@@ -95,11 +95,13 @@ def _length(text: str, what: str, *, si: bool) -> float:
     """A length in m; without a unit in mm, or in m with --si."""
     from kr16cli import units
 
-    for unit, scale in (("mm", units.metres(1.0)), ("m", 1.0)):
-        if text.strip().endswith(unit):
-            return values.number(text.strip().removesuffix(unit), what) * scale
-    number = values.number(text, what)
-    return number if si else units.metres(number)
+    number = text.strip()
+    unit = next((unit for unit in ("cm", "mm", "km", "m") if number.endswith(unit)), "")
+    if unit in ("cm", "km"):
+        raise InputError(f"{what} is {text}; give it in mm or m, such as 20mm or 0.02m")
+    value = values.number(number.removesuffix(unit), what)
+    metres = unit == "m" or (si and not unit)
+    return value if metres else units.metres(value)
 
 
 def _range(text: str | None, what: str, *, si: bool) -> Sequence[float] | None:
@@ -139,7 +141,8 @@ def make(p: Mapping[str, Any], data: RobotData) -> None:
             from kr16cli.report.map_figures import drawn
 
             draw(drawn(asked, store, answer["result"], str(p["plot"])))
-        studies.tell(p, file, answer, lambda a: table(a, si=p["si"]))
+    studies.tell(p, file, answer, lambda a: table(a, si=p["si"]))
+    batch.warn(answer["warnings"])
 
 
 def table(answer: Mapping[str, Any], *, si: bool = False) -> str:

@@ -27,3 +27,8 @@ class Bar:
         if self.shown:
             text = f"{'#' * round(30 * done / total):-<30} {done} of {total}{after}"
             print(f"\r\x1b[K{text[:78]}", end="", file=sys.stderr, flush=True)
+
+    def say(self, text: str) -> None:
+        """What is being done, where nobody knows how much there is."""
+        if self.shown:
+            print(f"\r\x1b[K{text[:78]}", end="", file=sys.stderr, flush=True)

@@ -22,6 +22,7 @@ def sweep(
     monte_carlo: v.MonteCarlo = None,
     latin: v.Latin = None,
     seed: v.Seed = "1",
+    simulator: v.Simulator = False,
     workers: studies.Workers = None,
     scheduler: studies.Scheduler = None,
     fresh: studies.Fresh = False,
@@ -37,7 +38,8 @@ def sweep(
     $ kr16 sweep free_swing --vary link[2].mass=x0.8:x1.2 --monte-carlo 20 --seed 7 --json
 
     One row for each run with its numbers and figures, as npz, CSV or Parquet. A run that fails is
-    marked and does not stop the others.
+    marked and does not stop the others. Motions that nothing answers (no controller, wrench or
+    acting limit) run on the compiled solvers, all others in the simulator; each row says which.
     """
     if scene is None:
         print(ctx.get_help(), file=sys.stderr)

@@ -84,7 +84,7 @@ def make(p: Mapping[str, Any], data: RobotData) -> None:
             from kr16cli.report.study_figures import trust_drawn
 
             draw(trust_drawn(answer, str(p["plot"])))
-        studies.tell(p, file, answer, table)
+    studies.tell(p, file, answer, table)
     batch.warn(answer["warnings"])
 
 
@@ -120,7 +120,7 @@ def table(answer: Mapping[str, Any]) -> str:
             if n in result
         )
     )
-    if result.get("agree_until") is not None:
+    if result.get("agree_until"):
         lines.append(f"  and for the path by less than 10 % until {result['agree_until']:.4g} s")
     return "\n".join([*lines, *_parameters(result), ""])
 
@@ -161,7 +161,9 @@ def _parameters(result: Mapping[str, Any]) -> list[str]:
         ] + ([row["torque_first_order"][joint]] if along else [])
         if max(numbers) >= 0.0005:
             shares = [f"{100 * max(v, 0.0):.1f}" for v in numbers]
-            rows.append([row["name"], f"{row['half']:g}", row["unit"], *shares])
+            relative = row["unit"] == "relative"
+            half = f"{100 * row['half']:g}" if relative else f"{row['half']:g}"
+            rows.append([row["name"], half, "%" if relative else row["unit"], *shares])
     title = f"share of the variance of the gravity torque of {result['leading_joint']}, %"
     if along:
         heads.append("along motion")

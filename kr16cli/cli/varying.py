@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -35,6 +35,10 @@ Latin = Annotated[
     str | None, typer.Option("--latin", metavar="N", help="N runs of a Latin hypercube.")
 ]
 Seed = Annotated[str, typer.Option("--seed", metavar="S", help="Of the random numbers.")]
+Simulator = Annotated[
+    bool,
+    typer.Option("--simulator", help="Run all in the simulator, one by one; it is much slower."),
+]
 
 
 def work(p: Mapping[str, Any], data: RobotData) -> SweepWork:
@@ -51,6 +55,7 @@ def work(p: Mapping[str, Any], data: RobotData) -> SweepWork:
             monte_carlo=values.whole(p["monte_carlo"], "--monte-carlo", 1, 10**8),
             seed=values.whole(p["seed"], "--seed", 0, 2**63) or 0,
         ),
+        simulator=p["simulator"],
     )
 
 
@@ -75,7 +80,7 @@ def make(p: Mapping[str, Any], data: RobotData) -> None:
             from kr16cli.report.sweep_figures import sweep_drawn
 
             draw(sweep_drawn(answer, columns, str(p["plot"])))
-        studies.tell(p, file, answer, table)
+    studies.tell(p, file, answer, table)
     failed = answer["result"]["failed"]
     if failed:
         first = answer["result"]["failures"][0]
@@ -89,10 +94,15 @@ def table(answer: Mapping[str, Any]) -> str:
     """The summary as text."""
     result, units = answer["result"], answer["units"]
     varied = result["vary"]
+    runs = result["runs"]
     lines = [
-        f"{answer['input']['scenario']['name']}: {answer['robot']}, {result['runs']} runs, "
+        f"{answer['input']['scenario']['name']}: {answer['robot']}, {runs} run{'s' * (runs > 1)}, "
         f"{result['design']}, {result['failed']} failed",
-        *(f"  {path} from {v['least']:.6g} to {v['largest']:.6g}" for path, v in varied.items()),
+        *_ran(result),
+        *(
+            f"  {path} from {v['least']:.6g} to {v['largest']:.6g} {units.get(path, '')}".rstrip()
+            for path, v in varied.items()
+        ),
     ]
     rows = []
     for name, told in result["figures"].items():
@@ -109,6 +119,30 @@ def table(answer: Mapping[str, Any]) -> str:
         )
     still = [n for n, told in result["figures"].items() if told and not told["varies"]]
     if still:
-        lines.append(f"  unchanged: {', '.join(still)}")
-    header = ["", "least", "mean", "largest", "sigma", *(f"rank {path}" for path in varied)]
-    return "\n".join([*lines, *render.grid(header, rows), ""])
+        lines.append(f"  unchanged: {', '.join(_folded(still))}")
+    if rows:
+        header = ["", "least", "mean", "largest", "sigma", *(f"rank {path}" for path in varied)]
+        lines += render.grid(header, rows)
+    return "\n".join([*lines, ""])
+
+
+def _ran(result: Mapping[str, Any]) -> list[str]:
+    """Who ran how many, and why not the compiled solvers."""
+    words = {
+        "rollout": "by the compiled solvers: {} of {}",
+        "simulator": "in the simulator: {} of {}",
+    }
+    why = result["why_simulator"]
+    return [
+        f"  {words[name].format(count, result['runs'])}"
+        + (f"; {why}" if name == "simulator" and why else "")
+        for name, count in result["engines"].items()
+    ]
+
+
+def _folded(names: Sequence[str]) -> list[str]:
+    """Names of numbers; of figures with a number for each joint, the figure if all are there."""
+    stems = [name.rpartition("_")[0] for name in names]
+    whole = {stem for stem in stems if stems.count(stem) == 6}
+    folded = (stem if stem in whole else n for n, stem in zip(names, stems, strict=True))
+    return list(dict.fromkeys(folded))

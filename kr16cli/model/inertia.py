@@ -136,19 +136,32 @@ _ZERO_POSE = ((1, ZERO),) * 6
 
 def link_body(link: LinkData, index: int, g: Geometry) -> Body:
     """Link `index` (1..6) of a file as a body in joint frame `index`."""
-    body = body_about(link.mass, link.com, link.inertia)
-    at_zero = frames(_ZERO_POSE, g)
-    joint = joint_frames(at_zero, g)[index - 1]
-    own = at_zero[index] if link.frame == "dh" else Frame(*_UNIT, p=joint.p)
-    return moved(body, *_seen_from(joint, own))
+    return _link_body(link, index, _zero_pose(g))
 
 
 def payload_body(payload: Payload, g: Geometry) -> Body:
     """A load given in flange axes from the flange origin, as a body in joint frame 6."""
+    return _payload_body(payload, _zero_pose(g))
+
+
+def _zero_pose(g: Geometry) -> tuple[list[Frame], list[Frame]]:
+    """The chapter's frames 0 to 6 and the six joint frames at q = 0."""
+    links = frames(_ZERO_POSE, g)
+    return links, joint_frames(links, g)
+
+
+def _link_body(link: LinkData, index: int, at_zero: tuple[list[Frame], list[Frame]]) -> Body:
+    body = body_about(link.mass, link.com, link.inertia)
+    links, joints = at_zero
+    joint = joints[index - 1]
+    own = links[index] if link.frame == "dh" else Frame(*_UNIT, p=joint.p)
+    return moved(body, *_seen_from(joint, own))
+
+
+def _payload_body(payload: Payload, at_zero: tuple[list[Frame], list[Frame]]) -> Body:
     body = body_about(payload.mass, payload.com, payload.inertia)
-    at_zero = frames(_ZERO_POSE, g)
-    joint, flange = joint_frames(at_zero, g)[5], flange_of_frame6(at_zero[6])
-    return moved(body, *_seen_from(joint, flange))
+    links, joints = at_zero
+    return moved(body, *_seen_from(joints[5], flange_of_frame6(links[6])))
 
 
 def _seen_from(frame: Frame, other: Frame) -> tuple[Frame, Vector]:
@@ -161,9 +174,10 @@ def robot_bodies(
     links: Sequence[LinkData], payload: Payload | None, g: Geometry
 ) -> tuple[Body, ...]:
     """The six moving links in their joint frames; the payload joins link 6."""
-    bodies = [link_body(link, i, g) for i, link in enumerate(links, 1)]
+    at_zero = _zero_pose(g)
+    bodies = [_link_body(link, i, at_zero) for i, link in enumerate(links, 1)]
     if payload is not None and payload.mass != 0:
-        bodies[5] = bodies[5] + payload_body(payload, g)
+        bodies[5] = bodies[5] + _payload_body(payload, at_zero)
     return tuple(bodies)
 
 
@@ -176,9 +190,9 @@ def regroup(bodies: Sequence[Body], g: Geometry) -> tuple[Body, ...]:
     turn. 38 numbers stay (36 are seen when gravity is along z). Regrouped links are no bodies:
     use the full set for masses, potential energy and base wrench.
     """
-    result = list(bodies)
+    result, between = list(bodies), steps(g)
     for i in range(5, 0, -1):
-        body, step = result[i], steps(g)[i - 1]
+        body, step = result[i], between[i - 1]
         rod, result[i] = _take_rod(body)
         result[i - 1] = result[i - 1] + _rod_in_parent(rod, step)
     first = result[0]

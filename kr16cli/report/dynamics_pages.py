@@ -117,7 +117,7 @@ def orders(document: Document, content: Content) -> None:
         "simulation",
     )  # fmt: skip
     page = document.page(title)
-    axis = page.axes(250, LEFT + 50)
+    axis = page.axes(200, LEFT + 50)
     f = r.figures
     figures.order_curves(
         axis,

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _A4 = (8.27, 11.69)
 _MOST_BARS = 10
+_MOST_POSES = 3
 
 
 def trust_drawn(answer: Mapping[str, Any], name: str) -> bytes:
@@ -53,10 +54,13 @@ def trust_figure(answer: Mapping[str, Any]) -> Figure:
     parts: Any = figure.subfigures(2, 1, height_ratios=(1.0, 2.2)) if columns else [figure]
     left, right = parts[0].subplots(1, 2, width_ratios=(1.0, 1.25))
     gravity_bands(left, result)
+    left.set_xlabel(_poses(result["poses_deg"]), fontsize=7.5, color=MUTED)
+    # Below: marks may be anywhere within the axes.
+    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=7)
     importance_bars(right, result)
     if columns:
         axes = np.atleast_2d(parts[1].subplots(6, len(columns), sharex="col", squeeze=False))
-        labels = {"torque": "torque of the nominal motion, N m", "motion": "path, deg"}
+        labels = {"torque": "torque that the nominal motion needs, N m", "motion": "path, deg"}
         for k, column in enumerate(columns):
             for j, joint in enumerate(result["joints"]):
                 scale = 1.0 if column == "torque" else 1.0 / RAD_PER_DEG
@@ -70,7 +74,7 @@ def trust_figure(answer: Mapping[str, Any]) -> Figure:
 
 
 def gravity_bands(axis: Axes, result: Mapping[str, Any]) -> None:
-    """Nominal gravity torques with both 95 % bands, a mark for each pose."""
+    """Nominal gravity torques with both 95 % bands, a mark for each pose; the legend is not set."""
     gravity, joints = result["gravity"], result["joints"]
     count = len(result["poses_deg"])
     for i in range(count):
@@ -86,7 +90,13 @@ def gravity_bands(axis: Axes, result: Mapping[str, Any]) -> None:
     axis.set_xticks(range(6), joints)
     axis.set_ylabel("N m")
     axis.set_title("gravity torque")
-    axis.legend(loc="best")
+
+
+def _poses(poses: Sequence[Sequence[float]]) -> str:
+    """Which angles the marks belong to."""
+    words = [" ".join(f"{v:.4g}" for v in pose) for pose in poses[:_MOST_POSES]]
+    more = "; ..." if len(poses) > _MOST_POSES else ""
+    return ("left to right: " if len(words) > 1 else "at ") + "; ".join(words) + more + " deg"
 
 
 def importance_bars(axis: Axes, result: Mapping[str, Any]) -> None:
@@ -101,10 +111,12 @@ def importance_bars(axis: Axes, result: Mapping[str, Any]) -> None:
     )
     for k, (key, label, colour, hatch) in enumerate(kinds):
         shares = [100.0 * r[f"gravity_{key}"][joint] for r in rows]
-        axis.barh(place + (k - 0.5) * 0.38, shares, height=0.34, color=colour, hatch=hatch,
-                  edgecolor="white", lw=0.4, label=label)  # fmt: skip
+        bars = axis.barh(place + (k - 0.5) * 0.38, shares, height=0.34, color=colour, hatch=hatch,
+                         edgecolor="white", lw=0.4, label=label)  # fmt: skip
+        axis.bar_label(bars, fmt="%.1f", padding=2, fontsize=6.5, color=MUTED)
     axis.set_yticks(place, [_named(r) for r in rows])
     axis.invert_yaxis()
+    axis.margins(x=0.12)
     axis.set_xlabel("share of the variance, %")
     axis.set_title(f"what moves the torque of {result['leading_joint']}")
     axis.grid(visible=False, axis="y")

@@ -22,6 +22,20 @@ _PREFERRED = (
     "error_position", "tau_share", "tau_max_2", "tau_max_3", "tau_max_1", "qd_max_2",
     "energy_kinetic_max", "work_torque", "position_end_3", "q_end_2", "time_end",
 )  # fmt: skip
+_WORDS = {
+    "time_end": "end",
+    "q_end": "angle at the end",
+    "qd_max": "largest speed",
+    "tau_max": "largest torque",
+    "tau_share": "largest torque / limit",
+    "position_end": "flange at the end",
+    "error_position": "largest distance\nfrom reference",
+    "error_angle": "largest angle\nfrom reference",
+    "energy_kinetic_max": "largest kinetic\nenergy",
+    "work_torque": "work of torques",
+    "energy_drift": "energy unexplained",
+    "limits_passed": "times a limit is passed",
+}
 
 
 def sweep_drawn(answer: Mapping[str, Any], columns: Mapping[str, Any], name: str) -> bytes:
@@ -36,30 +50,46 @@ def sweep_figure(answer: Mapping[str, Any], columns: Mapping[str, Any]) -> Figur
     """Rows of figures that vary, columns of numbers that were varied."""
     from matplotlib.figure import Figure
 
-    result = answer["result"]
+    result, units = answer["result"], answer["units"]
     paths = list(result["vary"])[:_MOST_PARAMETERS]
     names = _chosen(result["figures"])
     good = columns["status"] == "ok"
-    across, down = max(1, len(paths)), max(1, len(names))
-    figure = Figure(figsize=(1.6 + 2.6 * across, 1.0 + 1.9 * down), layout="constrained")
+    size = (1.6 + 2.6 * len(paths), 1.2 + 1.9 * len(names)) if names else (6.0, 1.6)
+    figure = Figure(figsize=size, layout="constrained")
+    runs = result["runs"]
     figure.suptitle(
-        f"{answer['input']['scenario']['name']}: {answer['robot']}\n{result['runs']} runs, "
+        f"{answer['input']['scenario']['name']}: {answer['robot']}\n{runs} run{'s' * (runs > 1)}, "
         f"{result['design']}" + (f", {result['failed']} failed" if result["failed"] else ""),
         fontsize=10.0,
     )
-    axes = figure.subplots(down, across, sharex="col", sharey="row", squeeze=False)
     if not names:
-        axes[0, 0].text(0.5, 0.5, "no figure varies", ha="center", color=MUTED,
-                        transform=axes[0, 0].transAxes)  # fmt: skip
+        why = "no figure varies" if good.any() else "no run has figures"
+        figure.text(0.5, 0.3, why, ha="center", color=MUTED)
+        return figure
+    axes = figure.subplots(len(names), len(paths), sharex="col", sharey="row", squeeze=False)
+    meant = False
     for i, name in enumerate(names):
         for k, path in enumerate(paths):
-            _against(axes[i, k], columns[path][good], columns[name][good])
+            meant |= _against(axes[i, k], columns[path][good], columns[name][good])
             _ranked(axes[i, k], result["figures"][name]["rank_correlation"][path])
-        unit = answer["units"].get(name) or answer["units"].get(name.rpartition("_")[0]) or ""
-        axes[i, 0].set_ylabel(f"{name}" + (f", {unit}" if unit not in ("", "1") else ""))
+        axes[i, 0].set_ylabel(_labelled(name, units))
     for k, path in enumerate(paths):
-        axes[-1, k].set_xlabel(path)
+        unit = units.get(path)
+        axes[-1, k].set_xlabel(path + (f", {unit}" if unit else ""))
+    marks = "a dot: a run; rank: Spearman's correlation"
+    figure.supxlabel(marks + ("; line: the mean" if meant else ""), fontsize=7.5, color=MUTED)
     return figure
+
+
+def _labelled(name: str, units: Mapping[str, str]) -> str:
+    """A figure in words with its unit; q_end_2 is that of A2."""
+    stem, _, part = name.rpartition("_")
+    unit = units.get(name) or units.get(stem) or ""
+    after = f", {unit}" if unit not in ("", "1") else ""
+    if name in _WORDS:
+        return _WORDS[name] + after
+    which = "xyz"[int(part) - 1] if stem == "position_end" else f"A{part}"
+    return f"{_WORDS[stem]},\n{which}{after}"
 
 
 def _chosen(figures: Mapping[str, Any]) -> list[str]:
@@ -69,12 +99,15 @@ def _chosen(figures: Mapping[str, Any]) -> list[str]:
     return (first + [name for name in varying if name not in first])[:_MOST_FIGURES]
 
 
-def _against(axis: Axes, x: Any, y: Any) -> None:
+def _against(axis: Axes, x: Any, y: Any) -> bool:
+    """Draw the runs, and their mean where it makes a line; whether it does."""
     axis.plot(x, y, "o", color=BLUE, ms=3.0, alpha=0.5 if len(x) > 50 else 0.9, mec="none",
               rasterized=len(x) > 5000)  # fmt: skip
     levels = np.unique(x)
     if 1 < len(levels) <= _LEVELS or (len(levels) == len(x) <= 200 and _is_curve(x)):
         axis.plot(levels, [np.nanmean(y[x == v]) for v in levels], color=INK, lw=1.0)
+        return True
+    return False
 
 
 def _is_curve(x: Any) -> bool:

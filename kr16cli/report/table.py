@@ -13,6 +13,9 @@ from kr16cli.report.typeset import BOLD, PLAIN, Face, Formula, formula, wrap
 _GAP = 7.0
 """Between columns."""
 
+_FEWEST = 3
+"""Fewer rows of a table than this look lost on a page."""
+
 _Wrapped = Sequence[str | Formula]
 
 
@@ -72,23 +75,39 @@ def table(
         The last page, its cursor below the table, and where each row landed.
     """
     landed: list[Row] = []
-    begun = False
-    for cells in rows:
-        set_cells = [_set(cell, c, size) for cell, c in zip(cells, columns, strict=True)]
-        height = max(len(lines) for _, lines in set_cells) * LEADING * size + 2 * pad
-        if not begun or page.room - keep < height:
-            if page.room - keep < height + 3 * size:
-                page = document.page(f"{title} (continued)" if begun else title)
-            _header(page, columns, size, left)
-            begun = True
-            if on_page:
-                on_page(page, page.y)
-        _row(page, columns, set_cells, size, left, pad)
-        landed.append(Row(page, page.y + height / 2))
-        page.y += height
-        page.rule(page.y, left=left, right=_right(columns, left))
+    ready = [[_set(cell, c, size) for cell, c in zip(row, columns, strict=True)] for row in rows]
+    heights = [max(len(lines) for _, lines in row) * LEADING * size + 2 * pad for row in ready]
+    head = _header_height(columns, size)
+    fresh = False
+    while len(landed) < len(rows):
+        first = len(landed)
+        count = _rows_that_fit(heights[first:], page.room - keep - head)
+        if not fresh and count < min(_FEWEST, len(rows) - first):
+            page, fresh = document.page(f"{title} (continued)" if first else title), True
+            continue
+        _header(page, columns, size, left)
+        if on_page:
+            on_page(page, page.y)
+        for i in range(first, first + max(1, count)):
+            _row(page, columns, ready[i], size, left, pad)
+            landed.append(Row(page, page.y + heights[i] / 2))
+            page.y += heights[i]
+            page.rule(page.y, left=left, right=_right(columns, left))
+        if len(landed) < len(rows):
+            page, fresh = document.page(f"{title} (continued)"), True
     page.y += 8.0
     return page, landed
+
+
+def _rows_that_fit(heights: Sequence[float], room: float) -> int:
+    """How many rows to set here, so that neither this page nor the next is left with a few."""
+    count, used = 0, 0.0
+    while count < len(heights) and used + heights[count] <= room:
+        used += heights[count]
+        count += 1
+    over = len(heights) - count
+    short = _FEWEST - over
+    return count - short if 0 < over < _FEWEST <= count - short else count
 
 
 def _right(columns: Sequence[Column], left: float) -> float:
@@ -102,10 +121,14 @@ def _set(cell: str | Cell, column: Column, size: float) -> tuple[Cell, _Wrapped]
     return own, wrap(own.text, column.width, size, own.face)
 
 
+def _header_height(columns: Sequence[Column], size: float) -> float:
+    return max(len(wrap(c.header, c.width, size, BOLD)) for c in columns) * LEADING * size + 4.0
+
+
 def _header(page: Page, columns: Sequence[Column], size: float, left: float) -> None:
     """Headers on a tinted strip; a header may take two lines."""
     wrapped = [wrap(c.header, c.width, size, BOLD) for c in columns]
-    height = max(map(len, wrapped)) * LEADING * size + 4.0
+    height = _header_height(columns, size)
     page.strip(page.y, height, TINT, left - 3, _right(columns, left) + 3)
     for (x, column), lines in zip(_places(columns, left), wrapped, strict=True):
         for i, line in enumerate(lines):

@@ -35,10 +35,10 @@ def trust(document: Document, content: Content) -> None:
         "robot was measured."
     )
     middle = LEFT + 190.0
-    left = page.axes(196, LEFT + 40, middle, move=False)
+    left = page.axes(126, LEFT + 40, middle, move=False)
     study_figures.gravity_bands(left, result)
-    left.legend(loc="upper left", bbox_to_anchor=(-0.15, -0.08), ncols=2)  # clear of the marks
-    study_figures.importance_bars(page.axes(196, middle + 138, RIGHT - 6, below=40), result)
+    left.legend(loc="upper left", bbox_to_anchor=(-0.15, -0.12), ncols=2)
+    study_figures.importance_bars(page.axes(126, middle + 138, RIGHT - 6, below=40), result)
     poses = "; ".join(_pose(q) for q in result["poses_deg"])
     page.caption(
         f"Left: a mark each for A = {poses} deg, in this order. Right: at the first of them; "
@@ -50,16 +50,17 @@ def trust(document: Document, content: Content) -> None:
     columns = (Column("at A, deg", 120), Column("joint", 30), *(
         Column(head, 52, "right") for head in ("nominal", "2.5 %", "97.5 %", "sigma", "first order")
     ))  # fmt: skip
-    page, _ = table(document, page, title, columns, _torques(result), size=8, pad=1.4)
+    page, _ = table(document, page, title, columns, _torques(result), size=8, pad=1.0)
     page.heading("Which number matters most: share of the variance, %")
     shown = [j for j in range(len(joints)) if any(_total(r, j) > _MOVES for r in _listed(result))]
     columns = (
-        Column("number", 82), Column("tolerance", 62, "right"),
-        Column(f"{joints[lead]}, first order", 66, "right"), Column("Sobol", 40, "right"),
-        *(Column(f"{joints[j]}, total", 48, "right") for j in shown),
+        Column("number", 82), Column("tolerance", 60, "right"),
+        Column(f"{joints[lead]}, first order", 52, "right"),
+        Column(f"{joints[lead]}, Sobol", 40, "right"),
+        *(Column(f"{joints[j]}, total", 28, "right") for j in shown),
     )  # fmt: skip
     rows = [_share_row(r, lead, shown) for r in _listed(result)]
-    page, _ = table(document, page, title, columns, rows, size=8, pad=1.4)
+    page, _ = table(document, page, title, columns, rows, size=8, pad=1.0)
     still = len(result["parameters"]) - len(rows)
     page.y += 6
     page.caption(

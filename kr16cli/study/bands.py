@@ -56,7 +56,7 @@ def of_motion(
         "band: 95 % of the torque this motion needs, given the file's tolerances (two sigma, first "
         "order)"
     )
-    return Bands(half, "; ".join([words, *taken_as_exact(data)]))
+    return Bands(half, "; ".join([words, *taken_as_exact(data, drives=drives)]))
 
 
 def of_run(data: RobotData, run: Run) -> Bands:

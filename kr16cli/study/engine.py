@@ -120,8 +120,14 @@ class Local:
                 pool.shutdown(cancel_futures=True)
 
     def _processes(self, work: Work, todo: Iterable[int]) -> Finished:
-        """As with threads; where a process dies, a new pool computes what was lost."""
+        """As with threads; where a process dies, a new pool computes what was lost.
+
+        A single chunk is computed here: to start a process takes longer than most of them.
+        """
         left, breaks = list(todo), 0
+        if len(left) == 1:
+            yield from self._here(work, left)
+            return
         while left:
             done: set[int] = set()
             pool = _process_pool(min(self.workers, len(left)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -20,6 +21,7 @@ Point = Literal["flange", "tool", "wrist"]
 MOST_POSES = 10**11
 """More poses than this are a slip of the keyboard: they take days and terabytes."""
 _MOST_ALONG = 10**6
+_POINTS_AT_ONCE = 4096
 _SLACK = 1e-9
 
 
@@ -60,14 +62,25 @@ class Grid:
 
     def positions(self, start: int, stop: int, out: Array) -> Array:
         """Points `start` to `stop` in the order of the map (z fastest), into (n, 3)."""
-        index = np.arange(start, stop)
-        # NumPy divides by one number several times faster than divmod does.
-        rest = index // len(self.z)
-        ix = rest // len(self.y)
-        iz, iy = index - rest * len(self.z), rest - ix * len(self.y)
-        for column, (axis, at) in enumerate(((self.x, ix), (self.y, iy), (self.z, iz))):
-            np.take(axis, at, out=out[:, column], mode="clip")
+        first, last, along = start // len(self.z), (stop - 1) // len(self.z), len(self.z)
+        lines = np.arange(first, last + 1)  # of points above one another
+        ix = lines // len(self.y)
+        counts = np.full(len(lines), along)
+        counts[0] -= start - first * along
+        counts[-1] -= (last + 1) * along - stop
+        out[:, 0] = np.repeat(self.x[ix], counts)
+        out[:, 1] = np.repeat(self.y[lines - ix * len(self.y)], counts)
+        begin = start - first * along
+        heights = self._heights
+        if len(heights) < begin + stop - start:
+            heights = np.resize(self.z, begin + stop - start)
+        out[:, 2] = heights[begin : begin + stop - start]
         return out
+
+    @cached_property
+    def _heights(self) -> Array:
+        """The heights of a line, again and again, for as many points as are usually asked for."""
+        return np.resize(self.z, len(self.z) + _POINTS_AT_ONCE)
 
 
 def make_grid(

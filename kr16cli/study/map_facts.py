@@ -22,14 +22,19 @@ SCHEMA = "kr16.map/1"
 
 def answer(work: MapWork, store: Store) -> dict[str, Any]:
     """The JSON answer of `kr16 map`."""
+    told = facts(work, store)
+    nothing = (
+        "nothing is reached within the joint limits: the whole grid lies beyond the arm, or the "
+        "orientation is impossible there; look at --x, --y, --z and --abc"
+    )
     return {
         "schema": SCHEMA,
         "robot": work.data.name,
         "model_sha256": work.data.sha256,
         "units": {name: column.unit or "1" for name, column in work.columns().items()},
         "input": work.describe(),
-        "result": facts(work, store),
-        "warnings": [],
+        "result": told,
+        "warnings": [] if told["reached"] else [nothing],
     }
 
 
@@ -42,11 +47,11 @@ def facts(work: MapWork, store: Store) -> dict[str, Any]:
 
     Returns:
         JSON-ready, SI units: `rows`, `reached`, `share`, `branches` (how many rows have how
-        many), `measures` (least, mean, largest, and where), `volume` (m3, None for a section)
-        and `envelope` (see `_envelope`).
+        many), `measures` (least, mean, largest, and where; of condition numbers the geometric
+        mean), `volume` (m3, None for a section) and `envelope` (see `_envelope`).
     """
     names = [n for n, c in work.columns().items() if c.dtype == "f4"]
-    measured = {name: _Extremes() for name in names}
+    measured = {name: _Extremes(ratio=name.startswith("condition")) for name in names}
     counts = np.zeros(9, dtype=np.int64)
     wrist = _Wrist(work)
     start = reached = 0
@@ -81,9 +86,13 @@ def point_of(work: MapWork, row: int) -> dict[str, Any]:
 
 
 class _Extremes:
-    """Least, largest and mean of a column, with the rows of the first two."""
+    """Least, largest and mean of a column, with the rows of the first two.
 
-    def __init__(self) -> None:
+    Of a `ratio` the mean is the geometric one: a single singular posture would decide the other.
+    """
+
+    def __init__(self, *, ratio: bool) -> None:
+        self.ratio = ratio
         self.least: tuple[float, int] | None = None
         self.most: tuple[float, int] | None = None
         self.total, self.count = 0.0, 0
@@ -98,16 +107,18 @@ class _Extremes:
             self.least = float(known[low]), start + int(there[low])
         if self.most is None or known[high] > self.most[0]:
             self.most = float(known[high]), start + int(there[high])
-        self.total += float(known.sum(dtype=np.float64))
+        shown = np.log(known, dtype=np.float64) if self.ratio else known
+        self.total += float(shown.sum(dtype=np.float64))
         self.count += len(known)
 
     def told(self, work: MapWork) -> dict[str, Any] | None:
         if self.least is None or self.most is None:
             return None
+        mean = self.total / self.count
         return {
             "least": self.least[0],
             "least_at": point_of(work, self.least[1]),
-            "mean": self.total / self.count,
+            "mean": float(np.exp(mean)) if self.ratio else mean,
             "largest": self.most[0],
             "largest_at": point_of(work, self.most[1]),
         }

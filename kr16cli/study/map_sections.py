@@ -96,16 +96,37 @@ def _gathered(
     return made
 
 
-def outline(work: MapWork) -> tuple[dict[str, Array], bool]:
+class Outline(NamedTuple):
     """Edges of the working envelope in the plane y = 0 by name, (n, 2) x and z in m.
 
-    Moved to the mapped point where that is at a fixed place from the wrist centre, in the
-    plane; else they are the wrist centre's, and the second result is False.
+    Attributes:
+        front: with the arm to the front, A1 = 0.
+        behind: with A1 turned by half a turn; empty where its limits do not let it.
+        moved: whether they are the mapped point's; else they are the wrist centre's.
     """
-    edges = dict(workspace(Setting(Robot(work.data), quick=True))["edges"])
+
+    front: dict[str, Array]
+    behind: dict[str, Array]
+    moved: bool
+
+
+def outline(work: MapWork) -> Outline:
+    """The envelope, moved to the mapped point where that is at a fixed place from the wrist centre.
+
+    With a fixed orientation the way from the wrist to the point is the same in every posture; it
+    must lie in the plane.
+    """
+    front = dict(workspace(Setting(Robot(work.data), quick=True))["edges"])
+    first = work.data.joints[0]
+    turns = max(-first.lower, first.upper) >= np.pi
+    behind = {name: points * [-1.0, 1.0] for name, points in front.items()} if turns else {}
     if work.point == "wrist":
-        return edges, True
+        return Outline(front, behind, moved=True)
     offset = -work.wrist_offsets()[0]
     if work.grid.kind == "free" or abs(offset[1]) > 1e-9:
-        return edges, False
-    return {name: points + offset[[0, 2]] for name, points in edges.items()}, True
+        return Outline(front, behind, moved=False)
+    front, behind = (
+        {name: points + offset[[0, 2]] for name, points in edges.items()}
+        for edges in (front, behind)
+    )
+    return Outline(front, behind, moved=True)

@@ -82,7 +82,7 @@ _LEAST = frozenset({"worst", "smallest_worst", "condition_best", "load_best", "m
 MAIN: Mapping[Quantity, str] = {
     "reach": "branches",
     "manipulability": "best",
-    "condition": "smallest_best",
+    "condition": "condition_best",
     "torque": "load_best",
     "payload": "mass_best",
 }

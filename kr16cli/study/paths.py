@@ -14,6 +14,7 @@ from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 from kr16cli.errors import InputError
+from kr16cli.robot_rules import look_up
 
 _PART = re.compile(r"(\w+)(?:\[(\d+)\])?$")
 _ROBOT = ("geometry", "joint", "link")
@@ -30,6 +31,22 @@ _OPTIONAL: Mapping[str, Any] = {
 _OF_FOLLOWERS: Mapping[str, Any] = {
     "controller": {"natural_frequency": 10.0, "damping_ratio": 1.0, "delay_s": 0.0},
     "reference": {"speed_percent": 100.0},
+}
+
+
+_UNITS: Mapping[str, str] = {
+    "payload.mass": "kg",
+    "payload.com": "m",
+    "payload.inertia": "kg m2",
+    "gravity": "m/s2",
+    "initial.q": "rad",
+    "initial.qd": "rad/s",
+    "controller.natural_frequency": "rad/s",
+}
+# The longest first: the speed deg_s ends in s, too.
+_SUFFIXES: Mapping[str, str] = {
+    **{"_deg_s": "deg/s", "_m_s2": "m/s2", "_m_s": "m/s", "_percent": "%"},
+    **{"_deg": "deg", "_nm": "N m", "_mm": "mm", "_n": "N", "_s": "s"},
 }
 
 
@@ -72,6 +89,16 @@ def find(tables: Tables, path: str) -> Place:
     raise InputError(f"--vary {path}: no number of the scenario or the robot has this path; {hint}")
 
 
+def unit_of(tables: Tables, path: str) -> str:
+    """The unit of the number a path names; empty where it has none, or it depends."""
+    keys = _keys(path)
+    if keys and keys[0] in _ROBOT:
+        return look_up(tables.robot, path)[1]
+    name = ".".join(key for key in keys if isinstance(key, str))
+    suffixes = (unit for suffix, unit in _SUFFIXES.items() if name.endswith(suffix))
+    return _UNITS.get(name) or next(suffixes, "")
+
+
 def known(tables: Tables) -> list[str]:
     """Every path there is."""
     made = list(_leaves(_widened(tables.scenario), ""))
@@ -80,11 +107,12 @@ def known(tables: Tables) -> list[str]:
 
 
 def changed(tables: Tables, places: list[Place], values: list[float | list[float]]) -> Tables:
-    """Copies of the tables with other values at some places.
+    """The tables with other values at some places; what nothing changes is not copied.
 
     A payload of no mass is no payload.
     """
-    made = copy.deepcopy(tables)
+    files = {place.file for place in places}
+    made = Tables(*(copy.deepcopy(t) if f in files else t for f, t in tables._asdict().items()))
     for place, value in zip(places, values, strict=True):
         if place.file == "scenario":
             _grow(made.scenario, place.keys)
@@ -92,10 +120,17 @@ def changed(tables: Tables, places: list[Place], values: list[float | list[float
         for key in place.keys[:-1]:
             node = node[key]
         node[place.keys[-1]] = value
+        _settle(made.robot, place, value)
     load = made.scenario.get("payload")
-    if isinstance(load, dict) and not load.get("mass"):
+    if "scenario" in files and isinstance(load, dict) and not load.get("mass"):
         del made.scenario["payload"]
     return made
+
+
+def _settle(robot: dict[str, Any], place: Place, value: float | list[float]) -> None:
+    """Forget that sources disagree on a number that no longer is what was chosen among them."""
+    if place.file == "robot" and value != place.value and "conflict" in robot:
+        robot["conflict"] = [c for c in robot["conflict"] if c.get("key") != place.path]
 
 
 def _keys(path: str) -> tuple[str | int, ...]:
@@ -131,13 +166,17 @@ def _widened(scenario: Mapping[str, Any]) -> dict[str, Any]:
 
 def _grow(scenario: dict[str, Any], keys: tuple[str | int, ...]) -> None:
     """Write down what a place stands in, where the file leaves it out."""
-    wide = _widened(scenario)
     first = str(keys[0])
-    if first not in scenario:
-        whole = wide[first]
-        scenario[first] = {} if isinstance(whole, dict) and len(keys) > 1 else copy.deepcopy(whole)
-    if len(keys) > 1 and isinstance(scenario[first], dict) and keys[1] not in scenario[first]:
-        scenario[first][keys[1]] = copy.deepcopy(wide[first][keys[1]])
+    inner = scenario.get(first)
+    if inner is not None and (len(keys) == 1 or not isinstance(inner, dict) or keys[1] in inner):
+        return
+    whole = _widened(scenario)[first]
+    if inner is None and len(keys) > 1 and isinstance(whole, dict):
+        inner = scenario[first] = {}
+    if inner is None:
+        scenario[first] = copy.deepcopy(whole)
+    else:
+        inner[keys[1]] = copy.deepcopy(whole[keys[1]])
 
 
 def _numbers(node: Any) -> bool:

@@ -1,29 +1,43 @@
 """Motions of a family of robots without a controller, and how a motion moves with its parameters.
 
-Fixed steps of RK4. The torque is that of the scenario: none, constant, or the gravity torque of
-the robot in the middle, which is what a controller that believes the file would give.
+The torque is that of the scenario: none, constant, or the gravity torque of the robot in the
+middle, which is what a controller that believes the file would give.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from kr16cli.api import Robot
 from kr16cli.arrays import Array
 from kr16cli.robot import RobotData
-from kr16cli.rollout import Variation, rollout
-from kr16cli.simulate.scenario import Scenario
+from kr16cli.rollout import Rollout, Variation, rollout
+from kr16cli.simulate.scenario import Scenario, TorqueSpec
+from kr16cli.study.crowd import variation_of
 from kr16cli.study.family import Family, slopes
+from kr16cli.study.open_runs import answered
 from kr16cli.study.spread import Uncertain, moved
 
-OPEN = ("zero", "constant", "gravity")
-"""Torques that do not look at the motion's error."""
 _STEP = 0.004
+_STEP_WITH_FRICTION = 0.001
+_MOST_STEPS = 2000
 _SAMPLES = 50
 """Intervals between the times that are kept."""
+
+# Radau's method IIA of order 5: it damps what friction makes stiff (Hairer and Wanner 1996, IV.5).
+_ROOT = 6.0**0.5
+_NODES = np.array([(4.0 - _ROOT) / 10.0, (4.0 + _ROOT) / 10.0, 1.0])
+_STAGES = np.array(
+    [
+        [(88 - 7 * _ROOT) / 360, (296 - 169 * _ROOT) / 1800, (-2 + 3 * _ROOT) / 225],
+        [(296 + 169 * _ROOT) / 1800, (88 + 7 * _ROOT) / 360, (-2 - 3 * _ROOT) / 225],
+        [(16 - _ROOT) / 36, (16 + _ROOT) / 36, 1 / 9],
+    ]
+)
 
 
 class Steps(NamedTuple):
@@ -41,23 +55,22 @@ class Steps(NamedTuple):
 
 
 def steps_of(scenario: Scenario) -> Steps:
-    """Steps of at most 4 ms, or the scenario's own, and some fifty samples."""
-    wanted = scenario.solver.step or _STEP
+    """Steps of 4 ms, of 1 ms with drives, or the scenario's own, and some fifty samples."""
+    wanted = scenario.solver.step or (_STEP_WITH_FRICTION if scenario.drives else _STEP)
+    wanted = max(wanted, scenario.duration / _MOST_STEPS)
     samples = min(_SAMPLES, max(1, round(scenario.duration / wanted)))
     every = max(1, int(np.ceil(scenario.duration / (samples * wanted) - 1e-9)))
     return Steps(scenario.duration / (samples * every), samples * every, every)
 
 
 def is_open(scenario: Scenario) -> bool:
-    """Whether the scenario's torque is one of `OPEN`, with nothing that pushes or stops."""
-    return (
-        scenario.controller is None
-        and scenario.wrench is None
-        and scenario.torque.kind in OPEN
-        and scenario.limits.joint == "report"
-        and not scenario.limits.torque
-        and not scenario.limits.speed
-    )
+    """Whether the scenario's torque does not look at the motion's error, and nothing pushes.
+
+    Friction under a torque that follows the angles is too stiff for the steps made here.
+    """
+    if scenario.torque.kind == "gravity" and not scenario.drives:
+        scenario = replace(scenario, torque=TorqueSpec())
+    return answered(scenario) is None
 
 
 def robot_of(data: RobotData, scenario: Scenario) -> Robot:
@@ -77,50 +90,46 @@ def torque_of(robot: Robot, scenario: Scenario) -> Callable[[Array], Array]:
 def motions(family: Family, scenario: Scenario, steps: Steps) -> Array:
     """Joint angles of every robot of a family, (n, samples, 6), rad.
 
-    By the compiled rollouts where they know all that differs; else, with a torque that follows
-    the angles or lengths that differ, the same steps on NumPy columns.
+    By the compiled solvers, robot by robot where lengths differ; with a torque that follows the
+    angles by fixed steps of RK4 on NumPy columns.
     """
-    lengths = any(source.name.startswith("geometry") for source in family.sources)
-    if scenario.torque.kind != "gravity" and not lengths:
-        return _compiled(family, scenario, steps)
-    return _columns(family, scenario, steps)
+    if scenario.torque.kind == "gravity":
+        return _columns(family, scenario, steps)
+    if not any(source.name.startswith("geometry") for source in family.sources):
+        data = moved(family.data, family.sources, list(family.deviations.T))
+        fields = variation_of(data, len(family), drives=family.drives)
+        return _moved(family.data, scenario, steps.time, Variation(**fields))
+    each = [moved(family.data, family.sources, row) for row in family.deviations.tolist()]
+    return np.stack([_moved(data, scenario, steps.time)[0] for data in each])
 
 
-def _compiled(family: Family, scenario: Scenario, steps: Steps) -> Array:
-    robot = robot_of(family.data, scenario)
-    motion = rollout(
-        robot,
-        np.tile(scenario.q, (len(family), 1)),
-        np.tile(scenario.qd, (len(family), 1)),
+def _moved(
+    data: RobotData, scenario: Scenario, times: Array, variation: Variation | None = None
+) -> Array:
+    """Joint angles by the compiled solvers, (n, samples, 6)."""
+    found = _solved(data, scenario, times, variation).q
+    return found if found.ndim == 3 else found[None]
+
+
+def _solved(
+    data: RobotData, scenario: Scenario, times: Array, variation: Variation | None = None
+) -> Rollout:
+    """The motion under a given torque, by the scenario's RK4 or with steps to its tolerance."""
+    solver = scenario.solver_used()
+    fixed = solver.method == "RK4"
+    return rollout(
+        robot_of(data, scenario),
+        scenario.q,
+        scenario.qd,
         duration=scenario.duration,
-        times=np.minimum(steps.time, scenario.duration),
-        method="rk4",
-        step=steps.size * (1.0 + 1e-9),
+        times=np.minimum(times, scenario.duration),
+        method="rk4" if fixed else "dopri5",
+        step=solver.step if fixed else None,
+        rtol=solver.rtol,
+        atol=solver.atol,
         tau=np.array(scenario.torque.tau or (0.0,) * 6),
-        variation=_variation(family),
+        variation=variation,
     )
-    return motion.q
-
-
-def _variation(family: Family) -> Variation:
-    """The numbers of each robot of a family."""
-    n = len(family)
-    data = moved(family.data, family.sources, list(family.deviations.T))
-
-    def table(values: Sequence[Any]) -> Array:
-        return np.stack([np.broadcast_to(np.asarray(v, dtype=float), n) for v in values], axis=-1)
-
-    made = {
-        "link_mass": table([link.mass for link in data.links]),
-        "link_com": np.stack([table(link.com) for link in data.links], axis=1),
-        "link_inertia": np.stack([table(link.inertia) for link in data.links], axis=1),
-    }
-    if family.drives:
-        joints = data.joints
-        made["rotor_inertia"] = table([joint.reflected_inertia for joint in joints])
-        made["coulomb"] = table([0.0 if j.coulomb is None else j.coulomb for j in joints])
-        made["viscous"] = table([0.0 if j.viscous is None else j.viscous for j in joints])
-    return Variation(**made)
 
 
 def _columns(family: Family, scenario: Scenario, steps: Steps) -> Array:
@@ -135,24 +144,19 @@ def _columns(family: Family, scenario: Scenario, steps: Steps) -> Array:
     state = np.tile(np.array([*scenario.q, *scenario.qd]), (len(family), 1))
     kept = [state[:, :6]]
     for i in range(1, steps.number + 1):
-        state = _stepped(rate, state, steps.size)[0]
+        state = _stepped(rate, state, steps.size)
         if i % steps.every == 0:
             kept.append(state[:, :6])
     return np.stack(kept, axis=1)
 
 
-def _stepped(
-    rate: Callable[[Array], Array], state: Array, h: float
-) -> tuple[Array, tuple[Array, ...]]:
-    """One step of RK4, and the four states at which the rate was asked."""
+def _stepped(rate: Callable[[Array], Array], state: Array, h: float) -> Array:
+    """One step of RK4."""
     k1 = rate(state)
-    second = state + 0.5 * h * k1
-    k2 = rate(second)
-    third = state + 0.5 * h * k2
-    k3 = rate(third)
-    fourth = state + h * k3
-    after = state + (h / 6.0) * (k1 + 2.0 * (k2 + k3) + rate(fourth))
-    return after, (state, second, third, fourth)
+    k2 = rate(state + 0.5 * h * k1)
+    k3 = rate(state + 0.5 * h * k2)
+    after: Array = state + (h / 6.0) * (k1 + 2.0 * (k2 + k3) + rate(state + h * k3))
+    return after
 
 
 def sensitivities(
@@ -160,35 +164,50 @@ def sensitivities(
 ) -> Array:
     """Derivative of the motion with respect to each source, (samples, d, 6), rad per unit.
 
-    The variational equation S' = A S + B along the motion, with the same RK4: A from the exact
-    derivatives of forward dynamics, B = -M^-1 d tau / d p, in which the torque of inverse
-    dynamics is a polynomial of degree two in each number.
+    The variational equation S' = A S + B along the motion by Radau's method, a linear system
+    each step: A from the exact derivatives of forward dynamics, B = -M^-1 d tau / d p, in which
+    the torque of inverse dynamics is a polynomial of degree two in each number.
     """
     robot = robot_of(data, scenario)
     torque = torque_of(robot, scenario)
+    h, n = steps.size, steps.number
+    states = _along(robot, torque, scenario, steps)
+    A, B = _linear(robot, sources, states, torque, scenario)
+    A, B = (v.reshape(n, 3, *v.shape[1:]) for v in (A, B))
+    # Stages K_i = A_i (S + h sum_j a_ij K_j) + B_i: K = P S + R for all steps at once.
+    system = -h * np.einsum("ij,nikl->nikjl", _STAGES, A).reshape(n, 36, 36)
+    system += np.eye(36)
+    known = np.concatenate([A.reshape(n, 36, 12), B.reshape(n, 36, -1)], axis=2)
+    solved = np.linalg.solve(system, known).reshape(n, 3, 12, -1)
+    rise = h * np.einsum("i,nikl->nkl", _STAGES[2], solved)
+    S = np.zeros((12, len(sources)))
+    kept = [S[:6].T]
+    for i, each in enumerate(rise, 1):
+        S = S + each[:, :12] @ S + each[:, 12:]
+        if i % steps.every == 0:
+            kept.append(S[:6].T)
+    return np.stack(kept)
+
+
+def _along(
+    robot: Robot, torque: Callable[[Array], Array], scenario: Scenario, steps: Steps
+) -> Array:
+    """States of the motion at the nodes of every step, (3 number, 12)."""
+    begins = steps.size * np.arange(steps.number)
+    times = (begins[:, None] + steps.size * _NODES).reshape(-1)
+    if scenario.torque.kind != "gravity":
+        found = _solved(robot.data, scenario, times)
+        return np.hstack([found.q, found.qd])
 
     def rate(state: Array) -> Array:
         q, qd = state[:, :6], state[:, 6:]
         return np.hstack([qd, robot.forward_dynamics(q, qd, torque(q))])
 
-    state = np.array([[*scenario.q, *scenario.qd]])
-    stages = []
-    for _ in range(steps.number):
-        state, asked = _stepped(rate, state, steps.size)
-        stages.append(np.vstack(asked))
-    A, B = _linear(robot, sources, np.vstack(stages), torque, scenario)
-    A, B = (v.reshape(steps.number, 4, *v.shape[1:]) for v in (A, B))
-    S = np.zeros((12, len(sources)))
-    kept, h = [S[:6].T], steps.size
-    for i, (a, b) in enumerate(zip(A, B, strict=True), 1):
-        k1 = a[0] @ S + b[0]
-        k2 = a[1] @ (S + 0.5 * h * k1) + b[1]
-        k3 = a[2] @ (S + 0.5 * h * k2) + b[2]
-        k4 = a[3] @ (S + h * k3) + b[3]
-        S = S + (h / 6.0) * (k1 + 2.0 * (k2 + k3) + k4)
-        if i % steps.every == 0:
-            kept.append(S[:6].T)
-    return np.stack(kept)
+    state, kept = np.array([[*scenario.q, *scenario.qd]]), []
+    for h in np.diff(times, prepend=0.0).tolist():
+        state = _stepped(rate, state, h)
+        kept.append(state[0])
+    return np.array(kept)
 
 
 def _linear(

@@ -25,7 +25,12 @@ _LEAST_FACTOR = 0.01
 
 _AXES = "xyz"
 _ENTRIES = ("xx", "yy", "zz", "xy", "xz", "yz")
-_DRIVE = {"rotor_inertia": "rotor_inertia", "coulomb_nm": "coulomb", "viscous_nms": "viscous"}
+_DRIVE = {
+    "gear_ratio": "gear_ratio",
+    "rotor_inertia": "rotor_inertia",
+    "coulomb_nm": "coulomb",
+    "viscous_nms": "viscous",
+}
 
 
 class Uncertain(NamedTuple):
@@ -49,7 +54,7 @@ def uncertain(data: RobotData, *, drives: bool = False) -> list[Uncertain]:
 
     Args:
         data: the robot.
-        drives: count rotor inertia and friction, too.
+        drives: count rotor inertia, gear ratio and friction, too.
 
     Raises:
         InputError: there is none.
@@ -68,13 +73,19 @@ def uncertain(data: RobotData, *, drives: bool = False) -> list[Uncertain]:
     return found
 
 
-def taken_as_exact(data: RobotData) -> list[str]:
-    """A sentence on the links without any tolerance; none where every link has one."""
+def taken_as_exact(data: RobotData, *, drives: bool = False) -> list[str]:
+    """A sentence on the links, and with `drives` the drives, without any tolerance; else none."""
     exact = [
         f"link {i}"
         for i, link in enumerate(data.links, 1)
         if not link.tolerance and not link.provenance.tolerances
     ]
+    if drives:
+        exact += [
+            f"the drive of {joint.name}"
+            for joint in data.joints
+            if any(getattr(joint, f) for f in _DRIVE.values()) and not any(_of_joint(0, joint))
+        ]
     return [f"no tolerance is stated for {', '.join(exact)}; taken as exact"] if exact else []
 
 

@@ -87,6 +87,7 @@ class Store:
         """Read the manifest and find the finished chunks, or start anew."""
         manifest = self.folder / _MANIFEST
         if self._fresh or not manifest.exists():
+            self._ours = True
             for old in self.folder.glob("*.npz"):
                 old.unlink()
             self._write_manifest(manifest)
@@ -174,7 +175,8 @@ class Store:
         """
         if index in self.done:
             return
-        with _as_file_error(self.folder, f"{len(self.done)} of {self.total} chunks are kept in it"):
+        kept = f"{len(self.done)} of {self.total} chunks are kept in it" if self.done else ""
+        with _as_file_error(self.folder, kept):
             _write_whole(self._path(index), lambda file: _savez(file, chunk))
         self.done.add(index)
 

@@ -1,4 +1,8 @@
-"""A scenario run again and again with other numbers: one row of figures for each run."""
+"""A scenario run again and again with other numbers: one row of figures for each run.
+
+Where nothing answers the motion, the compiled solvers move many runs at once (`open_runs`); all
+else, and what they cannot finish, the simulator runs one by one. Each row says who ran it.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +22,17 @@ from kr16cli.robot_file import parse_data
 from kr16cli.simulate.experiment import simulate
 from kr16cli.simulate.run import Run
 from kr16cli.simulate.scenario import load_scenario, parse_scenario, read_table, scenario_file
+from kr16cli.study import open_runs
 from kr16cli.study.design import Design
-from kr16cli.study.paths import Place, Tables, changed, find
+from kr16cli.study.open_runs import Case
+from kr16cli.study.paths import Place, Tables, changed, find, unit_of
 from kr16cli.study.work import Chunk, Column
 
 _STATUS = 120
-_CHUNK = 8
+_CHUNK = {True: 256, False: 8}
+"""Runs of a chunk, of the compiled solvers and of the simulator: about a second."""
+
+ROLLOUT, SIMULATOR = "rollout", "simulator"
 
 FIGURES: Mapping[str, Column] = {
     "time_end": Column("f8", (), "s"),
@@ -54,6 +63,7 @@ class SweepWork:
         scenario_path: of the scenario's.
         folder: what files in the scenario are relative to.
         design: the values.
+        simulator: run all by the simulator, whatever the compiled solvers could do.
     """
 
     tables: Tables
@@ -61,6 +71,7 @@ class SweepWork:
     scenario_path: str
     folder: str
     design: Design
+    simulator: bool = False
     prefers: Literal["threads", "processes"] = field(default="processes", init=False)
 
     def __post_init__(self) -> None:
@@ -71,6 +82,19 @@ class SweepWork:
         """Where the varied numbers stand."""
         return [find(self.tables, v.path) for v in self.design.variables]
 
+    @cached_property
+    def unserved(self) -> str | None:
+        """Why every run takes the simulator; None where the compiled solvers serve."""
+        if self.simulator:
+            return "it was asked for"
+        return open_runs.unserved(self.base.scenario)
+
+    @cached_property
+    def base(self) -> Case:
+        """The robot and the scenario of the files."""
+        scenario = parse_scenario(self.tables.scenario, self.scenario_path, Path(self.folder))
+        return Case(parse_data(self.tables.robot, self.path), scenario)
+
     @property
     def rows(self) -> int:
         """See `work.Work`."""
@@ -79,14 +103,16 @@ class SweepWork:
     @property
     def chunk_rows(self) -> int:
         """See `work.Work`."""
-        return _CHUNK
+        return _CHUNK[self.unserved is None]
 
     def columns(self) -> dict[str, Column]:
-        """See `work.Work`: the varied numbers by path, the figures, the status."""
+        """See `work.Work`: the varied numbers by path, the figures, the engine, the status."""
         varied = {
-            v.path: Column("f8", unit="factor" if v.factor else "") for v in self.design.variables
+            v.path: Column("f8", unit="factor" if v.factor else unit_of(self.tables, v.path))
+            for v in self.design.variables
         }
-        return {**varied, **FIGURES, "status": Column(f"U{_STATUS}")}
+        told = {"engine": Column("U9"), "status": Column(f"U{_STATUS}")}
+        return {**varied, **FIGURES, **told}
 
     def describe(self) -> dict[str, Any]:
         """See `work.Work`."""
@@ -101,42 +127,84 @@ class SweepWork:
             "design": d.kind,
             "runs": d.count,
             "seed": d.seed,
+            "engine": ROLLOUT if self.unserved is None else SIMULATOR,
         }
 
     def compute(self, start: int, stop: int) -> Chunk:
         """See `work.Work`."""
         values = self.design.rows(start, stop)
-        told = [self._run(row) for row in values.tolist()]
         made: Chunk = {v.path: values[:, i] for i, v in enumerate(self.design.variables)}
-        for name, column in FIGURES.items():
-            made[name] = np.array([row[name] for row in told], dtype=column.dtype)
-        made["status"] = np.array([row["status"] for row in told], dtype=f"U{_STATUS}")
+        for name, column in self.columns().items():
+            if name in FIGURES:
+                absent = -1 if column.dtype == "i4" else np.nan
+                made[name] = np.full((len(values), *column.shape), absent, dtype=column.dtype)
+            elif name not in made:
+                made[name] = np.full(len(values), "", dtype=column.dtype)
+        cases: dict[int, Case] = {}
+        for i, row in enumerate(values.tolist()):
+            try:
+                cases[i] = self.case(row)
+            except Kr16Error as error:
+                made["status"][i] = _words(_reason(error))
+        if self.unserved is None:
+            self._at_once(made, cases)
+        for i, case in cases.items():
+            self._alone(made, i, case)
         return made
 
-    def _run(self, values: list[float]) -> dict[str, Any]:
-        """The figures of one run, or why there is none."""
+    @staticmethod
+    def _at_once(made: Chunk, cases: dict[int, Case]) -> None:
+        """Fill the rows of the runs that the compiled solvers complete, and take them out."""
         try:
-            data, run = self.one(values)
-        except Kr16Error as error:
-            absent = {name: np.full(c.shape, np.nan) for name, c in FIGURES.items()}
-            return {**absent, "limits_passed": -1, "status": _words(_reason(error))}
-        status = "ok" if run.failure is None else _words(run.failure)
-        return {**figures(run, data), "status": status}
+            found = open_runs.figures(list(cases.values()))
+        except Kr16Error:
+            return  # the simulator finds whose fault it is
+        rows = np.array(list(cases), dtype=int)[found.complete]
+        for name, told in found.columns.items():
+            made[name][rows] = told[found.complete]
+        made["engine"][rows], made["status"][rows] = ROLLOUT, "ok"
+        for i in rows.tolist():
+            del cases[i]
 
-    def one(self, values: list[float]) -> tuple[RobotData, Run]:
-        """The robot and the run with these values.
+    @staticmethod
+    def _alone(made: Chunk, i: int, case: Case) -> None:
+        """Fill the row of a run of the simulator, or say why there is none."""
+        made["engine"][i] = SIMULATOR
+        try:
+            run = simulate(*case)
+        except Kr16Error as error:
+            made["status"][i] = _words(_reason(error))
+            return
+        for name, value in figures(run, case.data).items():
+            made[name][i] = value
+        made["status"][i] = "ok" if run.failure is None else _words(run.failure)
+
+    def case(self, values: list[float]) -> Case:
+        """The robot and the scenario with these values.
 
         Raises:
-            Kr16Error: values that break a rule of the files, or a reference out of reach.
+            Kr16Error: values that break a rule of the files.
         """
         new = [
             _value(place.value, value, factor=v.factor)
             for place, value, v in zip(self.places, values, self.design.variables, strict=True)
         ]
         tables = changed(self.tables, self.places, new)
-        data = parse_data(tables.robot, self.path)
-        scenario = parse_scenario(tables.scenario, self.scenario_path, Path(self.folder))
-        return data, simulate(data, scenario)
+        data, scenario = self.base
+        if tables.robot is not self.tables.robot:
+            data = parse_data(tables.robot, self.path)
+        if tables.scenario is not self.tables.scenario:
+            scenario = parse_scenario(tables.scenario, self.scenario_path, Path(self.folder))
+        return Case(data, scenario)
+
+    def one(self, values: list[float]) -> tuple[RobotData, Run]:
+        """The robot and its run in the simulator with these values.
+
+        Raises:
+            Kr16Error: values that break a rule of the files, or a reference out of reach.
+        """
+        case = self.case(values)
+        return case.data, simulate(*case)
 
 
 def _value(stands: Any, value: float, *, factor: bool) -> Any:
@@ -147,8 +215,12 @@ def _value(stands: Any, value: float, *, factor: bool) -> Any:
     return int(new) if isinstance(stands, int) and float(new).is_integer() else new
 
 
-def sweep_of(robot_file: str, scenario: str, design: Design) -> SweepWork:
+def sweep_of(
+    robot_file: str, scenario: str, design: Design, *, simulator: bool = False
+) -> SweepWork:
     """A sweep of a scenario file (or a shipped one's name) with a robot file.
+
+    With `simulator` no compiled solver takes the simulator's place.
 
     Raises:
         FileError, ParameterError: the files themselves must be sound.
@@ -158,7 +230,7 @@ def sweep_of(robot_file: str, scenario: str, design: Design) -> SweepWork:
     load_scenario(file)
     robot = tomllib.loads(Path(robot_file).read_text(encoding="utf-8-sig"))
     tables = Tables(read_table(file), robot)
-    return SweepWork(tables, robot_file, str(file), str(file.parent), design)
+    return SweepWork(tables, robot_file, str(file), str(file.parent), design, simulator)
 
 
 def figures(run: Run, data: RobotData) -> dict[str, Any]:

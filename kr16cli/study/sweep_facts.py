@@ -35,7 +35,8 @@ def answer(work: SweepWork, columns: dict[str, Array]) -> dict[str, Any]:
     good = columns["status"] == "ok"
     units = {name: column.unit for name, column in work.columns().items() if column.unit}
     varied = [v.path for v in work.design.variables]
-    names = [n for n in columns if n not in (*varied, "status")]
+    names = [n for n in columns if n not in (*varied, "engine", "status")]
+    engines, runs = np.unique(columns["engine"][columns["engine"] != ""], return_counts=True)
     return {
         "schema": SCHEMA,
         "robot": data.name,
@@ -46,6 +47,8 @@ def answer(work: SweepWork, columns: dict[str, Array]) -> dict[str, Any]:
             "runs": work.rows,
             "failed": int((~good).sum()),
             "design": work.design.kind,
+            "engines": dict(zip(engines.tolist(), runs.tolist(), strict=True)),
+            "why_simulator": work.unserved,
             "vary": {
                 path: {"least": float(columns[path].min()), "largest": float(columns[path].max())}
                 for path in varied

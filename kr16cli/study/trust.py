@@ -10,6 +10,7 @@ import numpy as np
 
 from kr16cli.arrays import Array
 from kr16cli.robot import RobotData
+from kr16cli.study.open_runs import answered
 from kr16cli.study.session import write_npz
 from kr16cli.study.spread import standard, taken_as_exact
 from kr16cli.study.store import Store, whole_file
@@ -120,7 +121,8 @@ def _compared(samples: Array, nominal: Array, slopes: Array, sigma: Array) -> di
 def _agreeing(work: UncertaintyWork, compared: dict[str, dict[str, Any]]) -> float | None:
     """The time (s) up to which both standard deviations of the motion differ by at most 10 %.
 
-    Of the largest one at each time; None without a motion.
+    Of the largest one at each time, and beyond what so few samples leave open (two standard
+    errors, 1 / sqrt(2 (n - 1)) each); None without a motion.
     """
     if work.steps is None:
         return None
@@ -128,7 +130,8 @@ def _agreeing(work: UncertaintyWork, compared: dict[str, dict[str, Any]]) -> flo
     first = found["sigma_first_order"]
     gap = np.abs(found["sigma"] - first).max(axis=1)
     # At the start all robots are in one state, up to rounding.
-    apart = np.flatnonzero(gap > _AGREEING * first.max(axis=1) + 1e-12)
+    allowed = _AGREEING + 2.0 / np.sqrt(2.0 * (work.samples - 1))
+    apart = np.flatnonzero(gap > allowed * first.max(axis=1) + 1e-12)
     last = len(gap) if not len(apart) else int(apart[0])
     return float(work.steps.time[max(0, last - 1)])
 
@@ -138,16 +141,17 @@ def _plain(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _warnings(work: UncertaintyWork, result: dict[str, Any]) -> list[str]:
-    texts = taken_as_exact(work.data)
+    texts = taken_as_exact(work.data, drives=work.drives)
     if work.scenario is not None and work.steps is None:
         texts.append(
-            "the scenario's controller, wrench or limits answer the motion: its torque has bands, "
-            "its path is taken as the nominal one"
+            f"{answered(work.scenario)}: its torque has bands, its path is taken as the nominal one"
         )
-    if work.steps is not None and result["agree_until"] < work.steps.time[-1]:
+    until = result["agree_until"]
+    if work.steps is not None and until < work.steps.time[-1]:
+        when = f"from {until:.3g} s on" if until > 0.0 else "from the start"
         texts.append(
-            f"the motion is first order to 10 % until {result['agree_until']:.3g} s only; after it "
-            "the samples alone tell"
+            f"first order misses the spread of the path by more than 10 % {when}; there the "
+            "samples alone tell"
         )
     return texts
 
