@@ -31,11 +31,12 @@ class Quantity(NamedTuple):
         """The rule that `value` breaks, or None."""
         if not math.isfinite(value):
             return "every number must be finite"
-        if abs(value) > self.high:
+        below = value < self.low or (self.open_low and value == self.low)
+        if abs(value) > self.high and not (below and self.low == 0.0):
             unit = f"in {self.unit}, " if self.unit else ""
             rule = f"{self.what} are {unit}at most {self.high:g}"
             return f"{rule}; {value:g} looks like {self.mistaken}" if self.mistaken else rule
-        if value < self.low or (self.open_low and value == self.low):
+        if below:
             relation = ">" if self.open_low else ">="
             return f"must be {relation} {self.low:g} {self.unit}".rstrip()
         return None

@@ -64,7 +64,7 @@ _CLASSES = {
 class Instance:
     """An instance spoken to by names of variables; its calls are FMPy's, in `fmu`."""
 
-    def __init__(self, path: Path, *, exchange: bool = False) -> None:
+    def __init__(self, path: Path, *, exchange: bool = False, events: bool = False) -> None:
         folder, self.description = unpacked(path)
         self.version = int(self.description.fmiVersion[0])
         self.messages: list[str] = []
@@ -73,12 +73,12 @@ class Instance:
             guid=self.description.guid, unzipDirectory=folder, modelIdentifier="KR16",
             instanceName="tested",
         )  # fmt: skip
-        self._instantiate()
+        self._instantiate({"eventModeUsed": True} if events else {})
 
-    def _instantiate(self) -> None:
+    def _instantiate(self, more: dict[str, bool]) -> None:
         if self.version == 3:
             self._log = fmi3.fmi3LogMessageCallback(self._heard3)
-            self.fmu.instantiate(loggingOn=True, logMessage=self._log)
+            self.fmu.instantiate(loggingOn=True, logMessage=self._log, **more)
             return
         callbacks = fmi2.fmi2CallbackFunctions()
         callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._heard2)

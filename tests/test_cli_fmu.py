@@ -130,7 +130,7 @@ def test_check_takes_fmus_of_others_with_our_names(folder: Path) -> None:
 
 
 def test_run_reads_inputs_and_writes_outputs(folder: Path) -> None:
-    Path("in.csv").write_text("time [s];tau1;tau[2] [N.m]\n0;0;0\n0,5;10;-20,5\n1;0;0\n")
+    Path("in.csv").write_text("time (s);tau1;tau[2] [N.m]\n0;0;0\n0,5;10;-20,5\n1;0;0\n")
     done = kr16("fmu", "run", fmus.file(), "--input", "in.csv", "-o", "out.csv", "--step", 0.1,
                 "--set", "control.mode=2", "--set", "drives=true")  # fmt: skip
     assert (done.code, done.out) == (0, ""), done.err
@@ -171,6 +171,12 @@ def test_run_takes_times_from_the_fmu_without_input() -> None:
         ("fmu run KR16.fmu --step 9", ("step of 9 s",)),
         ("fmu run KR16.fmu --step 1e-9", ("steps",)),
         ("fmu run KR16.fmu -o out.npz", (".csv",)),
+        ("fmu run KR16.fmu --set control.mode=2.5", ("control.mode is 2.5", "whole number")),
+        ("fmu run KR16.fmu --set drives=2", ("drives is 2", "true or false")),
+        ("fmu build --fmi 3", ("--fmi", "--native")),
+        ("fmu build --arrays", ("--arrays", "--native")),
+        ("fmu build --platforms all", ("--platforms", "--native")),
+        ("fmu build --native --no-shim", ("--no-shim", "leave it out")),
         ("fmu build --scenario nowhere", ("nowhere", "shipped")),
         ("fmu build --robot kr16_l6", ("inertial",)),
         ("fmu build -o nowhere/x.fmu", ("nowhere", "cannot be written")),

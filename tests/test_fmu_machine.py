@@ -249,6 +249,10 @@ def test_numbers_that_are_not_finite_are_refused(
         (lambda m: m.setup(_NAN, None, None), "start time"),
         (lambda m: m.setup(1.0, 0.5, None), "stop time"),
         (lambda m: m.setup(0.0, None, 0.0), "tolerance"),
+        (
+            lambda m: (m.setup(0.0, 0.01, None), m.enter(), m.leave(), m.step(0.0, 0.02)),
+            "past the stop time, 0.01 s",
+        ),
         (lambda m: m.get([0], ("String",)), "Real"),
     ],
 )

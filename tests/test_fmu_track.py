@@ -287,6 +287,17 @@ def test_wrong_calls_are_refused_with_a_reason(source: _Source) -> None:
     source.begin(motion__rate=3.0)
 
 
+def test_no_step_goes_past_the_stop_time(source: _Source) -> None:
+    source.fmu.setupExperiment(startTime=0.0, stopTime=0.03)
+    source.fmu.enterInitializationMode()
+    source.fmu.exitInitializationMode()
+    for k in range(3):
+        source.step(k * 0.01, 0.01)
+    with pytest.raises(FMICallException):
+        source.step(0.03, 1e-4)
+    assert "past the stop time" in source.messages[-1]
+
+
 def test_instance_of_another_build_is_refused(tmp_path: Path) -> None:
     path = _file("hold")
     folder = fmpy.extract(str(path), str(tmp_path))

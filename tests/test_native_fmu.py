@@ -16,6 +16,7 @@ from fmpy.validation import validate_fmu
 
 import kr16cli
 import native_fmus as native
+from command_line import complains, kr16
 from kr16cli.fmi import compiling
 from kr16cli.fmi.machine import Machine
 from kr16cli.fmi.native import library, numbers, sources, table
@@ -126,6 +127,19 @@ def test_description_with_arrays_is_valid_and_moves_alike() -> None:
     )
     assert np.array_equal(array["q"][-1], [scalar[name][-1] for name in Q])
     assert np.array_equal(array["qd"][-1], [scalar[name][-1] for name in QD])
+
+
+def test_arrays_are_checked_and_run_element_by_element(tmp_path: Path) -> None:
+    single, arrays = native.file(3), native.file(3, arrays=True)
+    done = kr16("fmu", "check", arrays)
+    assert (done.code, done.err) == (0, ""), done.out
+    told = {v["name"]: v for v in kr16("fmu", "info", arrays, "--json").result()["variables"]}
+    assert (told["q"]["size"], told["solver.step"]["size"]) == (6, None)
+    (tmp_path / "in.csv").write_text("time,tau[2],wrench3\n0,-300,0\n0.1,10,20\n")
+    given = ("--input", tmp_path / "in.csv", "--set", "q_start[2]=-1.2", "--set", "drives=true")
+    runs = [kr16("fmu", "run", file, *given) for file in (single, arrays)]
+    assert runs[0].out == runs[1].out and runs[0].out.count("\n") == 12
+    complains(kr16("fmu", "run", arrays, "--set", "q_start[7]=1"), "no parameter q_start[7]")
 
 
 @pytest.mark.parametrize("version", [2, 3])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 import shutil
 import zipfile
@@ -14,12 +15,13 @@ import pytest
 import exports
 import kr16cli
 import native_fmus as native
+from command_line import kr16
 from fmus import BENT
 from kr16cli.assets import asset
 from kr16cli.fmi import choices, compiling, evidence, reading
 from kr16cli.fmi.compare import Comparison
 from kr16cli.fmi.native import build, library, toolchain
-from kr16cli.fmi.platforms import Runner, UnusableError
+from kr16cli.fmi.platforms import Job, Runner, UnusableError
 from kr16cli.fmi.variables import Part, Start
 from kr16cli.report import fmus as report
 
@@ -59,13 +61,19 @@ def test_a_state_that_goes_on_otherwise_is_a_problem(monkeypatch: pytest.MonkeyP
     with Runner() as runner:
         right = runner.run
 
-        def other(name: str, job: object) -> list[tuple[float, ...]]:
-            rows = right(name, job)  # type: ignore[arg-type]
-            return [(row[0] + 1e-15, *row[1:]) for row in rows] if job.save < 0 else rows  # type: ignore[attr-defined]
+        def other(name: str, job: Job) -> list[tuple[float, ...]]:
+            rows = right(name, job)
+            return rows if job.save >= 0 else [(row[0] + 1e-15, *row[1:]) for row in rows]
 
         monkeypatch.setattr(runner, "run", other)
         found = evidence.run(runner, platform, fmu, compared, "co-simulation")
     assert found.problems == ["a state serialized and set in another process does not go on alike"]
+
+
+def _valid(table: dict[str, object]) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json.loads(asset("data/schemas/fmu_table.json").read_text(encoding="utf-8"))
+    jsonschema.validate(table, schema)
 
 
 def test_platforms_that_cannot_run_say_why() -> None:
@@ -109,7 +117,43 @@ def test_table_of_all_platforms(tmp_path: Path) -> None:
     }
     ran = {r["platform"] for r in rows}
     assert ("Windows x86_64 (wine)" in ran) == (shutil.which("wine") is not None)
-    assert ("Linux aarch64 (qemu-aarch64)" in ran) == (shutil.which("qemu-aarch64") is not None)
+    arm = shutil.which("qemu-aarch64") and Path("/usr/aarch64-linux-gnu").is_dir()
+    assert ("Linux aarch64 (qemu-aarch64)" in ran) == bool(arm)
+    _valid(table)
     cases = report.numbered(report.cases(table))
     assert {c.status for c in cases} == {"passed"}
     assert len({c.id for c in cases}) == len(rows)
+
+
+def _record(*, passed: bool) -> dict[str, object]:
+    data = kr16cli.load_data()
+    found = {"group": "q", "largest": 1e-3, "unit": "rad", "time": 0.5, "relative": 1e-3}
+    row = {
+        "file": "KR16_fmi2.fmu", "fmi_version": "2.0", "interface": "co-simulation",
+        "host": "C host", "platform": "Windows x86_64 (wine)", "passed": passed,
+        "problems": [] if passed else ["q deviates by 0.001 rad"], "deviations": [found],
+        "tolerance": 1e-9, "steps": 100,
+    }  # fmt: skip
+    return {
+        "schema": evidence.SCHEMA, "robot": data.name, "model_sha256": data.sha256,
+        "units": {"q": "rad"}, "input": {"stop": 1.0, "step": 0.01}, "result": {"rows": [row]},
+        "warnings": ["not run on macOS arm64: nothing here runs its programs"],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("passed", [True, False])
+def test_command_writes_the_record_and_fails_with_a_row(
+    passed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(evidence, "table", lambda data, tell: _record(passed=passed))
+    path = tmp_path / "fmus.json"
+    done = kr16("fmu", "table", "-o", path)
+    assert done.code == (0 if passed else 1)
+    assert "warning: not run on macOS arm64" in done.err
+    assert ("1 of 1 FMUs fail, the first KR16_fmi2.fmu" in done.err) == (not passed)
+    record = json.loads(path.read_text(encoding="utf-8"))
+    _valid(record)
+    assert record == _record(passed=passed)
+    words = kr16("fmu", "table").out
+    assert "C host, Windows x86_64 (wine)" in words
+    assert ("FAILED: q deviates" in words) == (not passed)

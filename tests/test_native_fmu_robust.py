@@ -39,8 +39,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return found
 
 
-def _token() -> str:
-    return str(native.unpacked(native.file(3, start=_START))[1].guid)
+def _token(part: Part = Part.ROBOT) -> str:
+    return str(native.unpacked(native.file(3, part, _START))[1].guid)
 
 
 def _compile(folder: Path, name: str, words: Sequence[str], *, code: str = "") -> Path:
@@ -76,8 +76,8 @@ def _run(command: Sequence[str], folder: Path) -> str:
     return done.stdout
 
 
-def _fuzz(program: Path, words: Sequence[str], *before: str) -> None:
-    said = _run([*before, str(program), _token(), *words], program.parent)
+def _fuzz(program: Path, words: Sequence[str], *before: str, part: Part = Part.ROBOT) -> None:
+    said = _run([*before, str(program), _token(part), *words], program.parent)
     calls, errors = (int(part.split()[0]) for part in said.split(","))
     # Wrong calls and right ones: else little would be seen.
     assert 0.3 * calls < errors < 0.9 * calls
@@ -87,9 +87,12 @@ def test_any_calls_under_sanitizers(folder: Path) -> None:
     _fuzz(_compile(folder, "checked", _ADDRESSES, code="hand-written"), _SHORT)
 
 
-def test_no_call_allocates_but_what_makes_instances_and_states(folder: Path) -> None:
+@pytest.mark.parametrize("part", list(Part))
+def test_no_call_allocates_but_what_makes_instances_and_states(part: Part, tmp_path: Path) -> None:
     """And all is given back; and without memory there is an error. The library as it is shipped."""
-    _fuzz(_compile(folder, "counted", ["-DCOUNT"]), ("7", "30000", "2"))
+    with zipfile.ZipFile(native.file(3, part, _START)) as archive:
+        archive.extractall(tmp_path)
+    _fuzz(_compile(tmp_path, "counted", ["-DCOUNT"]), ("7", "30000", "2"), part=part)
 
 
 @pytest.mark.slow

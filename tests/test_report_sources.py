@@ -117,14 +117,14 @@ def test_times_alone_add_their_page_to_suites_that_run(
 def test_an_fmu_built_from_the_robot_moves_as_the_simulator() -> None:
     pytest.importorskip("pythonfmu")
     pytest.importorskip("fmpy")
-    result = fmus.own(kr16cli.load_data())
+    (result,) = fmus.own(kr16cli.load_data(), quick=True)
     assert (result.status, result.group, result.grade) == ("passed", "fmu", "D")
     assert result.error is not None and result.error <= result.tolerance
     assert {d["group"] for d in result.figures["deviations"]} >= {"q", "qd", "pose", "energy"}
 
 
 def test_an_arm_that_can_be_no_fmu_is_skipped_with_the_reason() -> None:
-    result = fmus.own(kr16cli.load_data("kr16_l6"))
+    (result,) = fmus.own(kr16cli.load_data("kr16_l6"), quick=False)
     assert result.status == "skipped"
     content = content_of(fmus=(result,))
     words = "\n".join(said_by(content))

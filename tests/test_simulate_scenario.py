@@ -291,6 +291,20 @@ def test_unknown_scenario_names_the_shipped_ones(tmp_path: Path) -> None:
         load_scenario(tmp_path)
 
 
+def test_method_of_an_option_drops_what_the_file_says_to_the_other_kind(tmp_path: Path) -> None:
+    fixed = with_options("free_swing", {"solver": {"method": "RK4", "step_s": 1e-3}})
+    assert fixed.solver == SolverSpec("RK4", step=1e-3)
+    path = tmp_path / "fixed.toml"
+    path.write_text(
+        'schema = "kr16.scenario/1"\nname = "fixed"\nduration_s = 1\n[initial]\n'
+        'q_deg = [0, 0, 0, 0, 0, 0]\n[solver]\nmethod = "RK4"\nstep_s = 0.002\n'
+    )
+    assert with_options(path, {"solver": {"method": "RK45"}}).solver == SolverSpec("RK45")
+    assert with_options(path, {"solver": {"step_s": 1e-3}}).solver == SolverSpec("RK4", step=1e-3)
+    with pytest.raises(ParameterError, match=r"solver.rtol = 1e-06: means nothing"):
+        with_options("free_swing", {"solver": {"method": "RK4", "rtol": 1e-6}})
+
+
 def test_options_replace_values_of_the_file(tmp_path: Path) -> None:
     torque_csv(tmp_path / "tau.csv", [[0.0, *TAU]])
     toml = (

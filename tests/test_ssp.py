@@ -207,6 +207,9 @@ def test_structure_follows_the_rules(name: str) -> None:
             if kind:
                 schema = etree.XMLSchema(etree.parse(str(schemas / f"SystemStructure{kind}.xsd")))
                 schema.assertValid(etree.fromstring(archive.read(member)))
+        root = etree.fromstring(archive.read("SystemStructure.ssd"))
+    kinds = [c.get("implementation") for c in root.iter(f"{{{ssp.SSD}}}Component")]
+    assert kinds == ["CoSimulation"] * 3  # the trajectory has no other
     description = read_ssd(str(_file(name)))
     system = description.system
     assert description.version == "1.0"

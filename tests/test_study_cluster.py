@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -99,3 +101,26 @@ def test_workers_here_are_started_and_ended():
     assert not Path(f"/proc/{pid}").exists()
     assert rows["index"].dtype == np.int64
     assert threading.active_count() < 50
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are POSIX")
+def test_ctrl_c_reaches_the_command_and_not_its_workers(tmp_path):
+    """A terminal interrupts the whole group of processes."""
+    words = ["map", "condition", "--grid", "60", "--scheduler", "local", "--workers", "1"]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parent.parent)}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "kr16cli", *words, "-o", "m.npz"], cwd=tmp_path, env=environment,
+        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    folder, deadline = tmp_path / "m.npz.partial", time.monotonic() + 120
+    while not list(folder.glob("0*.npz")) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=120)
+    assert (process.returncode, out) == (130, ""), err
+    kept = len(list(folder.glob("0*.npz")))
+    assert err.splitlines() == [
+        f"kr16: {kept} of 3 chunks are kept in m.npz.partial; the same command goes on from there",
+        "kr16: interrupted; nothing more was written",
+    ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -270,6 +271,42 @@ def test_extremes_are_where_they_are_said_to_be():
     assert told["largest"] == found[at]
     place = [axis[i] for axis, i in zip(work.axes().values(), at, strict=True)]
     assert [told["largest_at"][k] for k in "xyz"] == place
+
+
+def test_the_mean_of_a_condition_number_is_the_geometric_one():
+    work = a_map("condition", 0.3)
+    found = columns(work)["condition_best"]
+    with finished(work) as store:
+        told = map_facts.facts(work, store)["measures"]["condition_best"]
+    known = found[~np.isnan(found)].astype(float)
+    assert told["mean"] == pytest.approx(np.exp(np.log(known).mean()))
+    assert told["mean"] < 20.0 < known.mean()  # one singular posture decides the other mean
+
+
+@pytest.mark.parametrize(
+    "ranges", [None, {"y": [0.0]}, {"z": [0.5]}, {"x": [1.0], "y": [0.0]}, {"x": [1.0], "z": [0]}]
+)
+def test_points_are_those_of_the_axes_from_any_one_to_any_other(ranges):
+    grid = make_grid(DATA, 0.11, rotations=DOWN, ranges=ranges)
+    every = np.stack(np.meshgrid(grid.x, grid.y, grid.z, indexing="ij"), -1).reshape(-1, 3)
+    rng = np.random.default_rng(1)
+    for start in [0, grid.points - 1, *rng.integers(0, grid.points, 40).tolist()]:
+        stop = int(rng.integers(start + 1, min(grid.points, start + 6000) + 1))
+        found = grid.positions(start, stop, np.empty((stop - start, 3)))
+        assert (found == every[start:stop]).all()
+
+
+def test_the_outline_behind_the_arm_is_the_one_in_front_turned_over():
+    wrist = map_sections.outline(a_map("reach", point="wrist"))
+    flange = map_sections.outline(a_map("reach"))  # down: 158 mm below the wrist centre
+    down = np.array([0.0, -0.158])
+    for name, points in wrist.front.items():
+        assert wrist.behind[name] == pytest.approx(points * [-1, 1])
+        assert flange.front[name] == pytest.approx(points + down)
+        assert flange.behind[name] == pytest.approx(points * [-1, 1] + down)
+    first = replace(DATA.joints[0], lower=-3.0, upper=3.0)
+    short = replace(DATA, joints=(first, *DATA.joints[1:]))
+    assert map_sections.outline(a_map("reach", data=short)).behind == {}
 
 
 @pytest.mark.parametrize(

@@ -125,7 +125,7 @@ int kr16_call_output_rises(kr16_instance *self, const unsigned *references, size
 
 int kr16_call_event_mode(kr16_instance *self)
 {
-    ENTER("enterEventMode", AT(CONTINUOUS_TIME) | AT(STEPPING));
+    ENTER("enterEventMode", AT(EVENT) | AT(CONTINUOUS_TIME) | AT(STEPPING));
     if (!self->model_exchange && !self->event_mode)
         return kr16_fail(self, "enterEventMode: it was not asked for at instantiation");
     self->core.phase = EVENT;

@@ -229,7 +229,7 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x[], size
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                        const fmi2Integer order[], const fmi2Real value[])
 {
-    ENTER("setRealInputDerivatives", AT(INITIALIZING) | AT(STEPPING));
+    ENTER("setRealInputDerivatives", AT(INSTANTIATED) | AT(INITIALIZING) | AT(STEPPING));
     return (fmi2Status)kr16_input_rises(self, vr, n, order, value);
 }
 

@@ -41,6 +41,7 @@ int kr16_setup(kr16_instance *instance, int has_tolerance, double tolerance, dou
     if (has_tolerance && !(tolerance > 0.0 && isfinite(tolerance)))
         return kr16_fail(instance, "tolerance %g: must be a positive number", tolerance);
     instance->core.value[SLOT_TIME] = start;
+    instance->stop = has_stop ? stop : HUGE_VAL;
     if (has_tolerance) /* finer than rounding allows no step */
         instance->core.tolerance = fmax(tolerance, 1e-13);
     instance->core.ready = 0;
@@ -56,6 +57,7 @@ void kr16_hold_flags(kr16_instance *instance)
     instance->tell = NULL;
     for (int group = GROUP_LIMIT_POSITION; group <= GROUP_LIMIT_TORQUE; group++)
         kr16_compute(instance, group);
+    instance->core.fresh &= ~(1u << GROUP_MARGIN); /* margins depend on the flags */
     instance->tell = tell;
 }
 
@@ -112,27 +114,35 @@ static int diverged(kr16_instance *instance, double time, const double *x, int s
                      x[10], x[11]);
 }
 
-/* Which limits are passed at (t, x), a bit each. */
-static uint32_t passed(kr16_instance *instance, double t, const double *x)
+/* Whether a flag does not fit (t, x): an event is due. */
+static int due(kr16_instance *instance, double t, const double *x)
 {
     kr16_core *core = &instance->core;
-    uint32_t bits = 0;
+    const double *position = core->value + SLOT_LIMIT_POSITION;
+    const double *speed = core->value + SLOT_LIMIT_SPEED, *torque = core->value + SLOT_LIMIT_TORQUE;
     double tau[6] = {0.0}, cs[12], margin[24];
     kr16_trig(x, cs);
     kr16_asked(&core->plant, t, x, cs, tau);
     kr16_margins(core->value, x, tau, margin);
-    for (int i = 0; i < 24; i++)
-        bits |= (uint32_t)(margin[i] < 0.0) << i;
-    return bits;
+    for (int i = 0; i < 6; i++)
+        if ((margin[i] < 0.0 || margin[6 + i] < 0.0) != (position[i] != 0.0) ||
+            (margin[12 + i] < 0.0) != (speed[i] != 0.0) ||
+            (margin[18 + i] < 0.0) != (torque[i] != 0.0))
+            return 1;
+    return 0;
 }
 
-/* The step from `before`, cut where the first limit is passed: its part of h. */
-static double cut(kr16_instance *instance, double t, double h, const double *before, double *x)
+/* The step from `before`, cut where an event becomes due: its part of h. One that was due before,
+ * as inputs have jumped, does not cut it, so that time goes on whatever the host does. */
+static double cut(kr16_instance *instance, double t, double h, const double *before, double *x,
+                  int *event)
 {
     kr16_core *core = &instance->core;
-    const uint32_t old = passed(instance, t, before);
     double low = 0.0, high = 1.0, y[STATES];
-    if (passed(instance, t + h, x) == old)
+    if (!due(instance, t + h, x))
+        return 1.0;
+    *event = 1;
+    if (due(instance, t, before))
         return 1.0;
     for (int k = 0; k < 60 && high - low > 1e-12; k++) {
         const double middle = 0.5 * (low + high);
@@ -140,7 +150,7 @@ static double cut(kr16_instance *instance, double t, double h, const double *bef
         memcpy(y, before, sizeof y);
         if (kr16_advance(&core->plant, t, middle * h, y, &hint) != FINE)
             return 1.0;
-        if (passed(instance, t + middle * h, y) == old) {
+        if (!due(instance, t + middle * h, y)) {
             low = middle;
         } else {
             high = middle;
@@ -169,8 +179,7 @@ static int moved(kr16_instance *instance, double time, double size, kr16_step_re
             return diverged(instance, t, before, status);
         }
         if (instance->event_mode)
-            done = cut(instance, t, h, before, x);
-        result->event = done < 1.0 || result->event;
+            done = cut(instance, t, h, before, x, &result->event);
         result->reached = k + 1.0 == parts && done == 1.0 ? time + size : t + done * h;
         if (instance->between) {
             memcpy(core->value + SLOT_Q, x, sizeof x);
@@ -208,6 +217,11 @@ int kr16_do_step(kr16_instance *instance, double time, double size, kr16_step_re
                          "communication point %g s: the instance stands at %g s; go on from there, "
                          "or set back its state first",
                          time, now);
+    if (!(time + size <= instance->stop + fmax(slack, 1e-6 * size)))
+        return kr16_fail(instance,
+                         "communication step of %g s at %g s: it goes past the stop time, %g s; make "
+                         "it smaller",
+                         size, time, instance->stop);
     if (kr16_ready(instance) != OK)
         return ERROR;
     if (!(size / core->plant.step <= MOST_PARTS))

@@ -78,10 +78,11 @@ int kr16_restore(kr16_instance *instance, const void *state)
 
 int kr16_forget(kr16_instance *instance, void **state)
 {
-    if (!state)
-        return kr16_fail(instance, "freeFMUState: no state is given (NULL)");
-    free(*state);
-    *state = NULL;
+    (void)instance;
+    if (state) { /* NULL is to be ignored */
+        free(*state);
+        *state = NULL;
+    }
     return OK;
 }
 

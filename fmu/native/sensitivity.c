@@ -17,7 +17,7 @@ static const kr16_entry *entry_of(kr16_instance *instance, const char *call, uns
     const int start = slot >= SLOT_Q_START && slot < SLOT_Q_START + STATES &&
                       instance->core.phase <= INITIALIZING;
     const int smooth = state || (kr16_slots[slot].kind == REAL && group != 0);
-    if (known ? slot < INPUTS || state || start : smooth)
+    if (known ? slot < INPUTS || state || start || slot == SLOT_TIME : smooth)
         return entry;
     kr16_fail(instance,
               known ? "%s: no derivatives by %s; by states and inputs, and by q_start and qd_start "
@@ -34,7 +34,7 @@ static void seed(int slot, double value, double *dx, double *du)
         du[slot] += value;
     else if (slot >= SLOT_Q && slot < SLOT_Q + STATES)
         dx[slot - SLOT_Q] += value;
-    else
+    else if (slot != SLOT_TIME) /* nothing follows from time alone */
         dx[slot - SLOT_Q_START] += value;
 }
 

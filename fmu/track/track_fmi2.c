@@ -26,6 +26,7 @@ typedef struct {
 
 typedef struct {
     saved now;
+    double stop; /* of the experiment; infinite where none was told */
     fmi2CallbackLogger log;
     void *environment;
     char *name;
@@ -80,6 +81,7 @@ static uint64_t build(void)
 static void begin(source *self)
 {
     self->now = (saved){.build = build(), .rate = 1.0};
+    self->stop = HUGE_VAL;
 }
 
 const char *fmi2GetTypesPlatform(void)
@@ -147,6 +149,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2R
         return fail(self, "setupExperiment: start time %g, stop time %g: must be finite and rising",
                     start, stop);
     self->now.time = start;
+    self->stop = has_stop ? stop : HUGE_VAL;
     return fmi2OK;
 }
 
@@ -266,9 +269,10 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
     ENTER("freeFMUstate", ANY);
-    NEED(state, "freeFMUstate");
-    free(*state);
-    *state = NULL;
+    if (state) { /* NULL is to be ignored */
+        free(*state);
+        *state = NULL;
+    }
     return fmi2OK;
 }
 
@@ -356,6 +360,9 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
     if (!(fabs(time - now) <= fmax(slack, 1e-6 * size)))
         return fail(self, "communication point %g s: the instance stands at %g s; go on from there",
                     time, now);
+    if (!(time + size <= self->stop + fmax(slack, 1e-6 * size)))
+        return fail(self, "communication step of %g s at %g s: it goes past the stop time, %g s",
+                    size, time, self->stop);
     self->now.time = time + size;
     return fmi2OK;
 }

@@ -67,6 +67,9 @@ def build(ctx: typer.Context) -> None:
     from kr16cli.simulate.scenario import load_scenario
 
     p = ctx.params
+    for name, usual in (("fmi", "2"), ("arrays", False), ("platforms", "host")):
+        if p[name] != usual:
+            raise InputError(f"--{name} is for native FMUs; give --native, too")
     file_only(p["output"], "an FMU", "KR16.fmu")
     with out.Target(p["output"]) as target:
         data = runs.load(ctx)
@@ -174,13 +177,13 @@ def run(ctx: typer.Context) -> None:
         if p["output"] not in (None, "-") and Path(p["output"]).suffix.lower() != ".csv":
             raise InputError(f"-o {p['output']}: the suffix must be .csv")
         fmu = reading.read(p["file"])
-        inputs = [v.name for v in fmu.variables if v.causality == "input"]
+        inputs = [v.name for v in fmu.scalars if v.causality == "input"]
         signals = tables.read_signals(p["source"], inputs) if p["source"] else play.Signals()
         last = signals.times[-1] if signals.times else 0.0
         stop = _seconds(p, "stop") or last or fmu.number("stopTime") or 1.0
         step = _seconds(p, "step") or fmu.number("stepSize") or 0.01
         columns, messages = play.play(fmu, signals, stop, step, _starts(p["values_"]))
-        units = {"time": "s", **{v.name: v.unit or "" for v in fmu.variables}}
+        units = {"time": "s", **{v.name: v.unit or "" for v in fmu.scalars}}
         target.write(tables.to_csv(columns, units))
     batch.warn(messages)
 

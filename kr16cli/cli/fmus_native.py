@@ -56,6 +56,8 @@ def build(ctx: typer.Context) -> None:
     from kr16cli.simulate.scenario import load_scenario
 
     p = ctx.params
+    if p["no_shim"]:
+        raise InputError("--no-shim is for FMUs in Python; a native FMU has no shim, leave it out")
     if p["fmi"] not in ("2", "3"):
         raise InputError(f"--fmi is {p['fmi']}; it must be 2 or 3")
     version = int(p["fmi"])

@@ -8,6 +8,7 @@ answer as JSON to the file the job names.
 from __future__ import annotations
 
 import json
+import math
 import sys
 from typing import Any
 
@@ -36,9 +37,27 @@ def _signals(job: dict[str, Any]) -> Any:
 
     if not job["inputs"]:
         return None
-    names = ["time", *job["inputs"]]
-    columns = [job["times"], *job["inputs"].values()]
-    return np.array(list(zip(*columns, strict=True)), dtype=[(n, np.float64) for n in names])
+    given = {"time": job["times"], **job["inputs"]}
+    columns = {name: np.array(values, np.float64).T for name, values in given.items()}
+    table = np.empty(
+        len(job["times"]), dtype=[(n, np.float64, c.shape[1:]) for n, c in columns.items()]
+    )
+    for name, column in columns.items():
+        table[name] = column
+    return table
+
+
+def _columns(result: Any) -> dict[str, list[float]]:
+    """What FMPy recorded, each element of an array a column."""
+    columns = {}
+    for name in result.dtype.names:
+        values = result[name]
+        if values.ndim == 1:
+            columns[name] = [float(v) for v in values]
+            continue
+        for k, element in enumerate(values.reshape(len(values), -1).T, 1):
+            columns[f"{name}[{k}]"] = [float(v) for v in element]
+    return columns
 
 
 def simulate(job: dict[str, Any]) -> dict[str, Any]:
@@ -57,8 +76,7 @@ def simulate(job: dict[str, Any]) -> dict[str, Any]:
         )  # fmt: skip
     except Exception as error:
         return {"failure": " ".join([*str(error).split(), *errors[:1]])}
-    columns = {name: [float(v) for v in result[name]] for name in result.dtype.names}
-    return {"columns": columns, "warnings": warnings}
+    return {"columns": _columns(result), "warnings": warnings}
 
 
 def validate(job: dict[str, Any]) -> dict[str, Any]:
@@ -84,8 +102,10 @@ def states(job: dict[str, Any]) -> dict[str, Any]:
         if third
         else ("getFMUstate", "setFMUstate", "serializeFMUstate", "deSerializeFMUstate", "getReal")
     )
-    references = [v.valueReference for v in description.modelVariables
-                  if v.causality == "output" and v.type in ("Real", "Float64")]  # fmt: skip
+    outputs = [v for v in description.modelVariables
+               if v.causality == "output" and v.type in ("Real", "Float64")]  # fmt: skip
+    references = [v.valueReference for v in outputs]
+    counted = {"nValues": sum(math.prod(v.shape or ()) for v in outputs)} if third else {}
     h, differing = job["step"], []
 
     def begin(slave: Any) -> None:
@@ -101,7 +121,7 @@ def states(job: dict[str, Any]) -> dict[str, Any]:
     def go_on(slave: Any) -> Any:
         for k in range(10, 20):
             slave.doStep(k * h, h)
-        return getattr(slave, get)(references)
+        return getattr(slave, get)(references, **counted)
 
     try:
         first, second = (

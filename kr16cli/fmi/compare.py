@@ -68,14 +68,14 @@ class Comparison:
         q = [self._starts.get(name, 0.0) for name in variables.six("q_start")]
         self._table = table(data, Start(q=q, gravity=data.gravity), self._part)
         self._places = {v.name: k for k, v in enumerate(self._table)}
-        outputs = {v.name for v in fmu.variables if v.causality == "output"}
+        outputs = {v.name for v in fmu.scalars if v.causality == "output"}
         self.times = [k * STEP for k in range(round(STOP / STEP) + 1)]
         self.shared = [
             v.name
             for v in self._table
             if v.name in outputs and variables.group(v.name) in _COMPARED
         ]
-        self.inputs = self._waves(q, {v.name for v in fmu.variables if v.causality == "input"})
+        self.inputs = self._waves(q, {v.name for v in fmu.scalars if v.causality == "input"})
         self._expected: dict[bool, Mapping[str, Sequence[float]]] = {}
 
     def _waves(self, q: Sequence[float], there: set[str]) -> dict[str, list[float]]:
@@ -192,5 +192,5 @@ def _part(fmu: Fmu) -> Part:
     """Ours says what it is; else a controller is what measures angles."""
     if fmu.cargo:
         return Part(fmu.cargo.about["part"])
-    measures = any(v.name == "q[1]" and v.causality == "input" for v in fmu.variables)
+    measures = any(v.name == "q[1]" and v.causality == "input" for v in fmu.scalars)
     return Part.CONTROLLER if measures else Part.ROBOT

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 from kr16cli.errors import CheckFailedError, InputError, MissingPartError
 from kr16cli.fmi import build, check, choices, reading
-from kr16cli.fmi.compare import STEP, Comparison, Report
+from kr16cli.fmi.compare import STEP, STOP, Comparison, Report
 from kr16cli.fmi.compiling import find_compiler
-from kr16cli.fmi.native import build as native
+from kr16cli.fmi.native import build as builder
 from kr16cli.fmi.native.library import ALL, HOST, MODEL, platforms
 from kr16cli.fmi.native.toolchain import TARGETS
 from kr16cli.fmi.platforms import WORDS, Job, Runner, UnusableError
@@ -33,13 +33,20 @@ Row = dict[str, Any]
 Tell = Callable[[str], None]
 
 
-def table(data: RobotData, tell: Tell = lambda text: None, *, everywhere: bool = True) -> Row:
+def table(
+    data: RobotData,
+    tell: Tell = lambda text: None,
+    *,
+    everywhere: bool = True,
+    native: bool = True,
+) -> Row:
     """Build the FMUs of a robot and run them by every interface wherever this machine can.
 
     Args:
         data: the robot, with inertial data.
         tell: is told of each row before it is made.
         everywhere: on all platforms that can be compiled and run, else on this machine's alone.
+        native: the native FMUs too, and those of the controller; else the pythonfmu FMU alone.
 
     Returns:
         The record of schema `kr16.fmu_table/1`.
@@ -52,11 +59,13 @@ def table(data: RobotData, tell: Tell = lambda text: None, *, everywhere: bool =
     notes: list[str] = []
     with tempfile.TemporaryDirectory(prefix="kr16_table_") as folder, Runner() as runner:
         made = _Table(data, Path(folder), runner, notes, tell)
-        rows = list(made.rows(everywhere=everywhere))
+        rows = list(made.rows(everywhere=everywhere) if native else made.first())
     return {
         "schema": SCHEMA,
         "robot": data.name,
         "model_sha256": data.sha256,
+        "units": {d["group"]: d["unit"] for row in rows for d in row["deviations"]},
+        "input": {"stop": STOP, "step": STEP},
         "result": {"rows": rows},
         "warnings": notes,
     }
@@ -71,13 +80,19 @@ class _Table(NamedTuple):
     notes: list[str]
     tell: Tell
 
+    def first(self, part: Part = Part.ROBOT) -> Iterator[Row]:
+        """The pythonfmu FMU's row."""
+        options, _ = choices.options(self.data, None, part, find_compiler())
+        fmu = self._written(_name(part, None), build.build(self.data, options))
+        yield self._by_fmpy(fmu, Comparison(fmu, self.data), KINDS[0])
+
     def rows(self, *, everywhere: bool) -> Iterator[Row]:
+        """All rows."""
         crossing = everywhere and find_spec("ziglang") is not None
         if everywhere and not crossing:
             self._note("without ziglang (pip install ziglang) only this machine's library is built")
         for part in Part:
-            fmu = self._python_fmu(part)
-            yield self._by_fmpy(fmu, Comparison(fmu, self.data), KINDS[0])
+            yield from self.first(part)
             wide = crossing and part is Part.ROBOT
             try:
                 for version in (2, 3):
@@ -104,16 +119,12 @@ class _Table(NamedTuple):
         if text not in self.notes:
             self.notes.append(text)
 
-    def _python_fmu(self, part: Part) -> Fmu:
-        options, _ = choices.options(self.data, None, part, find_compiler())
-        return self._written(_name(part, None), build.build(self.data, options))
-
     def _native_fmu(self, part: Part, version: int, chosen: Sequence[str]) -> Fmu:
         name = _name(part, version)
         self.tell(f"building {name}")
         usual, _ = choices.options(self.data, None, part, None)
-        options = native.Options(usual.start, part, version=version, platforms=chosen)
-        return self._written(name, native.build(self.data, options))
+        options = builder.Options(usual.start, part, version=version, platforms=chosen)
+        return self._written(name, builder.build(self.data, options))
 
     def _written(self, name: str, content: bytes) -> Fmu:
         path = self.folder / name

@@ -55,6 +55,7 @@ class Machine:
         self._part, self._identity, self._warn = part, identity, warn
         self.phase = INSTANTIATED
         self.time = 0.0
+        self._stop = math.inf
         self._values: list[Any] = [v.start for v in variables]
         self._state: list[float] = []
         self._places = {v.name: place for place, v in enumerate(variables)}
@@ -164,7 +165,7 @@ class Machine:
             raise InputError(f"stop time {stop}: must not lie before the start time {start}")
         if tolerance is not None and not 0.0 < tolerance < math.inf:
             raise InputError(f"tolerance {tolerance}: must be a positive number")
-        self.time = start
+        self.time, self._stop = start, math.inf if stop is None else stop
 
     def enter(self) -> None:
         """Enter the initialization."""
@@ -207,6 +208,11 @@ class Machine:
             raise InputError(
                 f"communication point {time} s: the instance stands at {self.time} s; go on from "
                 "there, or set back its state first"
+            )
+        if not time + size <= self._stop + max(slack, 1e-6 * size):
+            raise InputError(
+                f"communication step of {size} s at {time} s: it goes past the stop time, "
+                f"{self._stop} s; make it smaller"
             )
         if self._part is Part.ROBOT:
             self._state = self._moved(time, size)

@@ -14,7 +14,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -58,19 +57,13 @@ class UnusableError(Exception):
     """Programs for a platform cannot be made or run here; says why."""
 
 
-@dataclass
 class Runner:
-    """Runs the program for platforms, in a scratch folder that `close` takes away.
+    """Runs the program for platforms, in a scratch folder; a context manager."""
 
-    Use as a context manager.
-    """
-
-    _folder: tempfile.TemporaryDirectory[str] = field(
-        default_factory=lambda: tempfile.TemporaryDirectory(
-            prefix="kr16_host_", ignore_cleanup_errors=True
-        )
-    )
-    _ready: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    def __init__(self) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="kr16_host_", ignore_cleanup_errors=True)
+        self._ready: dict[str, tuple[str, ...]] = {}
+        self._refused: dict[str, str] = {}
 
     def __enter__(self) -> Runner:
         return self
@@ -78,7 +71,7 @@ class Runner:
     def __exit__(self, *details: object) -> None:
         server = shutil.which("wineserver")
         if server and (self._here / "wine").exists():
-            self._call((server, "-w"))
+            self._call((server, "-w"))  # it writes into the folder until it ends
         self._folder.cleanup()
 
     @property
@@ -95,8 +88,17 @@ class Runner:
         Raises:
             UnusableError: it cannot be made or run here.
         """
-        if platform in self._ready:
-            return
+        if platform in self._refused:
+            raise UnusableError(self._refused[platform])
+        if platform not in self._ready:
+            try:
+                self._ready[platform] = self._made(platform)
+            except (UnusableError, FileError) as reason:
+                self._refused[platform] = str(reason)
+                raise UnusableError(str(reason)) from None
+
+    def _made(self, platform: str) -> tuple[str, ...]:
+        """The words that run the program of a platform, compiled and tried."""
         command = _runner(platform)
         program = f"host_{platform}" + (".exe" if platform.startswith("win") else "")
         compiler = find_compiler() if platform == host() else None
@@ -108,7 +110,7 @@ class Runner:
         words = (*command, f"./{program}")
         if "usage" not in self._call(words).stderr:
             raise UnusableError(f"{command[0] if command else 'this machine'} does not run it")
-        self._ready[platform] = words
+        return words
 
     def run(self, platform: str, job: Job) -> list[tuple[float, ...]]:
         """The outputs of each row of a job.

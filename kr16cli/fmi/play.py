@@ -6,7 +6,7 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
@@ -43,7 +43,7 @@ def play(
         signals: inputs, straight lines between their rows, held beyond the last.
         stop: end, s.
         step: communication step, s.
-        start_values: of parameters, by name.
+        start_values: of parameters, by name; elements of an array as `q_start[2]`.
         kind: one of `fmu.kinds`; where none is given, co-simulation is preferred.
         tolerance: relative, of FMPy's solver in model exchange; FMPy's own where none is given.
 
@@ -57,10 +57,14 @@ def play(
     """
     _check(fmu, signals, stop, step, start_values)
     outputs = [v.name for v in fmu.variables if v.causality == "output" and v.base != "String"]
+    starts, length = fmu.starts(), len(signals.times)
+    columns = {name: list(column) for name, column in signals.columns.items()}
     answer = ask(
         "simulate", fmu=str(Path(fmu.path).resolve()), stop=stop, step=step, outputs=outputs,
-        times=list(signals.times), inputs={k: list(v) for k, v in signals.columns.items()},
-        start_values=_typed(fmu, start_values), tolerance=tolerance,
+        times=list(signals.times),
+        inputs=_gathered(fmu, columns, lambda name: [starts.get(name, 0.0)] * length),
+        start_values=_gathered(fmu, _typed(fmu, start_values), lambda name: starts.get(name, 0.0)),
+        tolerance=tolerance,
         kind="".join(part.capitalize() for part in (kind or interface(fmu)).split("-")),
     )  # fmt: skip
     if "failure" in answer:
@@ -73,9 +77,24 @@ def interface(fmu: Fmu) -> str:
     return "co-simulation" if "co-simulation" in fmu.kinds else "".join(fmu.kinds[:1])
 
 
+def _gathered(fmu: Fmu, given: Mapping[str, Any], other: Callable[[str], Any]) -> dict[str, Any]:
+    """Elements put together where the FMU has arrays; `other` gives those that are not given."""
+    found = dict(given)
+    for v in fmu.variables:
+        names = [element.name for element in v.elements()]
+        if v.size is not None and any(name in given for name in names):
+            found[v.name] = [found.pop(n) if n in given else other(n) for n in names]
+    return found
+
+
 def _typed(fmu: Fmu, values: Mapping[str, float]) -> dict[str, Any]:
     """Start values as FMPy takes them for each type."""
-    bases = {v.name: v.base for v in fmu.variables}
+    bases = {v.name: v.base for v in fmu.scalars}
+    for name, v in values.items():
+        if "Int" in bases[name] and v != int(v):
+            raise InputError(f"{name} is {v:g}; it must be a whole number")
+        if bases[name] == "Boolean" and v not in (0.0, 1.0):
+            raise InputError(f"{name} is {v:g}; it must be true or false")
     return {
         name: bool(v) if bases[name] == "Boolean" else int(v) if "Int" in bases[name] else v
         for name, v in values.items()
@@ -86,8 +105,8 @@ def _check(
     fmu: Fmu, signals: Signals, stop: float, step: float, start_values: Mapping[str, float]
 ) -> None:
     """Refuse what the FMU does not have, and times without sense."""
-    inputs = [v.name for v in fmu.variables if v.causality == "input"]
-    parameters = [v.name for v in fmu.variables if v.start is not None]
+    inputs = [v.name for v in fmu.scalars if v.causality == "input"]
+    parameters = [v.name for v in fmu.scalars if v.start is not None]
     for names, known, what in (
         (signals.columns, inputs, "input"),
         (start_values, parameters, "parameter"),

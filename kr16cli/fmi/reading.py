@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -19,7 +21,11 @@ _LARGEST = 64 * 2**20
 
 @dataclass(frozen=True)
 class Described:
-    """One variable of a model description; `start` as written, None where there is none."""
+    """One variable of a model description; `start` as written, None where there is none.
+
+    `size` is how many numbers an array holds; None for one number, and where another variable
+    says how many.
+    """
 
     name: str
     base: str
@@ -28,6 +34,20 @@ class Described:
     unit: str | None
     start: str | None
     description: str
+    size: int | None = None
+
+    def elements(self) -> tuple[Described, ...]:
+        """An array's numbers as variables of their own, `q[1]` first; else itself."""
+        if self.size is None:
+            return (self,)
+        given = (self.start or "").split()
+        starts: Sequence[str | None] = given if len(given) == self.size else [None] * self.size
+        if len(given) == 1:
+            starts = given * self.size
+        return tuple(
+            replace(self, name=f"{self.name}[{k}]", start=start, size=None)
+            for k, start in enumerate(starts, 1)
+        )
 
 
 @dataclass(frozen=True)
@@ -47,11 +67,16 @@ class Fmu:
     shim: bool
     cargo: freight.Cargo | None
 
+    @cached_property
+    def scalars(self) -> tuple[Described, ...]:
+        """The variables, each element of an array by itself."""
+        return tuple(element for v in self.variables for element in v.elements())
+
     def starts(self) -> dict[str, float]:
-        """Start values that are numbers, by name; Booleans as 0 and 1."""
+        """Start values that are numbers, by the names of `scalars`; Booleans as 0 and 1."""
         words = {"true": 1.0, "false": 0.0}
         found = {}
-        for v in self.variables:
+        for v in self.scalars:
             if v.start is not None and v.base not in ("String", "Enumeration"):
                 try:
                     found[v.name] = words.get(v.start, 0.0) if v.start in words else float(v.start)
@@ -159,9 +184,16 @@ def _variables(root: ElementTree.Element) -> list[Described]:
                 unit=unit,
                 start=own.get("start"),
                 description=element.get("description", ""),
+                size=_size(element),
             )
         )
     return found
+
+
+def _size(element: ElementTree.Element) -> int | None:
+    """How many numbers an array of FMI 3.0 holds, where its dimensions are numbers."""
+    sizes = [dimension.get("start", "") for dimension in element.iterfind("Dimension")]
+    return math.prod(map(int, sizes)) if sizes and all(s.isdigit() for s in sizes) else None
 
 
 def _units_of_types(root: ElementTree.Element) -> dict[str, str]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from kr16cli.errors import FileError
 from kr16cli.fmi.play import Signals
 
-_UNIT = re.compile(r"\s+\[[^\]]*\]$")
+_UNIT = re.compile(r"\s+(\[[^\]]*\]|\([^)]*\))$")
 _NUMBERED = re.compile(r"(.*[A-Za-z_])([1-9]\d*)")
 
 

@@ -72,7 +72,7 @@ def gather(
     if not (evidence and (evidence.results or evidence.run)):
         evidence = sources.run_suites(plan.suites, setting, progress, evidence)
         if "fmu" in plan.pages and not evidence.fmus:
-            evidence = replace(evidence, fmus=(fmus.own(data),))
+            evidence = replace(evidence, fmus=fmus.own(data, quick=setting.quick))
     drawings, absent = drawn(plan, setting, evidence)
     return Content(plan, data, evidence, drawings, absent, created)
 

@@ -33,6 +33,13 @@ def fmu(document: Document, content: Content) -> None:
         "bit. This shows that packing, interface and compiled code keep the model; that the model "
         "is right is for the other pages to show (grade D)."
     )
+    if any(r.figures["host"] == "C host" for r in ran):
+        page.paragraph(
+            "CS is co-simulation. ME is model exchange, where the host steps: FMPy as its "
+            "tolerance wants, the C host as the simulator does. The C host is a small program that "
+            "loads the library as other tools do. It also serializes the state half-way, and "
+            "passes only if another process goes on from there to the last bit."
+        )
     groups = list(dict.fromkeys(d["group"] for r in ran for d in r.figures["deviations"]))
     if groups:
         axis = page.axes(18.0 * len(ran) + 36.0, LEFT + 146, below=52)

@@ -7,7 +7,6 @@ A file is what `kr16 fmu check --json` wrote, one FMU on one host, or a table of
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,26 +22,24 @@ _SHORT = {"co-simulation": "CS", "model-exchange": "ME", "scheduled-execution": 
 _UNNAMED = {"fmi_version": "?", "interface": "", "host": "unnamed host", "platform": ""}
 
 
-def own(data: RobotData) -> Result:
-    """The check of an FMU built from the robot for this report; skipped where it cannot be."""
-    from kr16cli.fmi import build, check, choices, reading
-    from kr16cli.fmi.variables import Part
+def own(data: RobotData, *, quick: bool) -> tuple[Result, ...]:
+    """The checks of FMUs built from the robot for this report; skipped where it cannot be.
 
-    name = "KR16.fmu"
+    Args:
+        data: the robot.
+        quick: the pythonfmu FMU alone; else native ones as well, by every interface.
+    """
+    from kr16cli.fmi import check, evidence
+
     try:
-        options, _ = choices.options(data, None, Part.ROBOT, None)
-        content = build.build(data, options)
-        with tempfile.TemporaryDirectory(prefix="kr16_report_") as folder:
-            path = Path(folder) / name
-            path.write_bytes(content)
-            fmu = reading.read(path)
-            row = check.envelope(fmu, check.check(fmu, None))["result"]
+        table = evidence.table(data, everywhere=False, native=not quick)
+        return tuple(numbered(cases(table)))
     except (MissingPartError, InputError) as reason:
-        return _skipped(name, str(reason))
+        return (_skipped("KR16.fmu", str(reason)),)
     except CheckFailedError as reason:
-        row = {"passed": False, "problems": [str(reason)], "deviations": [], "steps": 0,
-               "tolerance": check.EQUAL_STEPS}  # fmt: skip
-    return case({"file": name, **row})
+        failed = {"file": "KR16.fmu", "passed": False, "problems": [str(reason)], "deviations": [],
+                  "steps": 0, "tolerance": check.EQUAL_STEPS}  # fmt: skip
+        return (case(failed),)
 
 
 def cases(table: Mapping[str, Any]) -> list[Result]:

@@ -140,7 +140,8 @@ def with_options(
     Args:
         path: as for `load_scenario`; None starts from a scenario of 1 s without torque.
         options: a table like a scenario file's; None, or an empty table, replaces nothing.
-            The entries of `initial` and `solver` replace one by one, all else as a whole.
+            The entries of `initial` and `solver` replace one by one, all else as a whole. A
+            solver's method takes the place of what the file says to methods of the other kind.
         payload: replaces the file's.
 
     Raises:
@@ -158,6 +159,9 @@ def with_options(
         own = {k: v for k, v in given.pop(key, {}).items() if v is not None}
         kept = {k: v for k, v in table.get(key, {}).items() if not _same(k, own)}
         table[key] = kept | own
+        if "method" in own:
+            foreign = ("rtol", "atol") if own["method"] in FIXED else ("step_s",)
+            table[key] = {k: v for k, v in kept.items() if k not in foreign} | own
     if "torque" in given:  # it takes the place of a controller
         table.pop("controller", None)
         table.pop("reference", None)

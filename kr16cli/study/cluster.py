@@ -6,6 +6,8 @@ result arrives and is written, once, by the process that asked.
 
 from __future__ import annotations
 
+import logging
+import signal
 from collections.abc import Iterable
 from contextlib import ExitStack
 from itertools import islice
@@ -20,6 +22,11 @@ _AHEAD = 3
 # Times a chunk is given out again after an error of the network.
 _RETRIES = 3
 _PATIENCE = 20.0
+
+
+def dask_setup(worker: Any) -> None:
+    """What a worker started here does first: it leaves Ctrl-C to the process that started it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 class Cluster:
@@ -58,7 +65,11 @@ class Cluster:
             if self.address == "local":
                 target = stack.enter_context(
                     d.LocalCluster(
-                        n_workers=self.workers, threads_per_worker=1, dashboard_address=":0"
+                        n_workers=self.workers,
+                        threads_per_worker=1,
+                        dashboard_address=":0",
+                        silence_logs=logging.ERROR,
+                        preload=[__name__],
                     )
                 )
             try:

@@ -247,7 +247,7 @@ class _Judge:
         self.rotations, self.offsets = work.flange
         self.pose = np.zeros((_POSES_AT_ONCE, 4, 4))
         self.pose[:, 3, 3] = 1.0
-        self.known = -1
+        self.known, self.x = -1, np.nan
         self.measures = np.empty((_POSES_AT_ONCE, 6))
         self.angles = np.empty((_POSES_AT_ONCE, 8, 6))
         self.torques = np.array([j.torque or np.nan for j in work.data.joints])
@@ -260,7 +260,9 @@ class _Judge:
             self.known = orientation
         pose = self.pose[:n]
         # By coordinate: NumPy's loops over three numbers cost more than the sums.
-        for i, offset in enumerate(self.offsets[orientation]):
+        x, *others = self.offsets[orientation]
+        self._place_x(at[:, 0], float(x), pose)
+        for i, offset in enumerate(others, 1):
             np.add(at[:, i], offset, out=pose[:, i, 3])
         quantity = self.work.quantity
         if quantity in ("reach", "manipulability"):
@@ -269,6 +271,15 @@ class _Judge:
         if quantity == "condition":
             return self._condition(q)
         return self._torque(q)
+
+    def _place_x(self, x: Array, offset: float, pose: Array) -> None:
+        """Write x, which ascends and mostly is the block's before, where it stands already."""
+        if x[0] != x[-1]:
+            self.x = np.nan
+            np.add(x, offset, out=pose[:, 0, 3])
+        elif self.x != x[0] + offset:
+            self.x = float(x[0] + offset)
+            self.pose[:, 0, 3] = self.x
 
     def _closed(self, pose: Array, measures: Array) -> Chunk:
         self.robot.judge_branches(pose, out=measures)

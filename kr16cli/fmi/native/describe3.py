@@ -22,11 +22,14 @@ _COMMON = {
 _CO_SIMULATION = {
     "canHandleVariableCommunicationStepSize": True,
     "maxOutputDerivativeOrder": 1,
+    "hasEventMode": True,
+}
+_STEPPING = {
     "providesIntermediateUpdate": True,
     "mightReturnEarlyFromDoStep": True,
     "canReturnEarlyAfterIntermediateUpdate": True,
-    "hasEventMode": True,
 }
+"""Of a robot: it has internal steps, a controller has none."""
 _BASES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
 
 
@@ -47,7 +50,9 @@ def describe(name: str, identity: str, about: Mapping[str, Any], listed: Sequenc
         "variableNamingConvention": "structured",
         **{key: str(about[own]) for key, own in keys.items() if about.get(own)},
     })  # fmt: skip
-    for tag, more in (("ModelExchange", {}), ("CoSimulation", _CO_SIMULATION)):
+    robot = about["part"] == Part.ROBOT
+    stepping = _CO_SIMULATION | (_STEPPING if robot else {})
+    for tag, more in (("ModelExchange", {}), ("CoSimulation", stepping)):
         can = {key: word(value) for key, value in (_COMMON | more).items()}
         SubElement(root, tag, {"modelIdentifier": name, **can})
     units = SubElement(root, "UnitDefinitions")
@@ -61,7 +66,6 @@ def describe(name: str, identity: str, about: Mapping[str, Any], listed: Sequenc
         "startTime": "0.0", "stopTime": repr(float(about["stop"])), "tolerance": "1e-08",
         "stepSize": repr(float(about["step"])),
     })  # fmt: skip
-    robot = about["part"] == Part.ROBOT
     variables = SubElement(root, "ModelVariables")
     places = {item.name: place for place, item in enumerate(listed, 1)}
     variables.extend(_variable(item, places, robot=robot) for item in listed)
@@ -92,6 +96,8 @@ def _variable(item: Item, places: Mapping[str, int], *, robot: bool) -> Element:
         element.set("initial", "calculated")
     if v.causality != "independent":
         element.set("declaredType", v.type)
+    if robot and v.causality == "output" and v.variability == "continuous":
+        element.set("intermediateUpdate", "true")
     if kind.base == "Real":
         element.attrib |= units_of(kind)
     for key, values, chosen in (

@@ -212,7 +212,7 @@ def _connectors(component: Component) -> list[Variable]:
 def _component(component: Component) -> Element:
     element = Element("ssd:Component", {
         "name": component.name, "type": "application/x-fmu-sharedlibrary",
-        "source": f"resources/{component.name}.fmu",
+        "source": f"resources/{component.name}.fmu", "implementation": "CoSimulation",
     })  # fmt: skip
     connectors = SubElement(element, "ssd:Connectors")
     for v in _connectors(component):
