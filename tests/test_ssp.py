@@ -244,6 +244,7 @@ def test_components_are_valid_and_begin_where_the_scenario_does(component: str) 
     path, description = _component("circle_task_space", component)
     assert validate_fmu(str(path)) == []
     assert float(description.defaultExperiment.stepSize) == 0.004
+    assert float(description.defaultExperiment.tolerance) == 1e-8
     starts = {v.name: v.start for v in description.modelVariables}
     scenario = _cell("circle_task_space").scenario
     for i, angle in enumerate(scenario.q, 1):
