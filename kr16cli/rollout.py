@@ -304,6 +304,8 @@ def _each(table: Array, lead: tuple[int, ...], rank: int) -> Array:
 
 def _checked_variation(variation: Variation) -> dict[str, Array]:
     """The given fields as finite arrays that physics allows."""
+    if not isinstance(variation, Variation):
+        raise InputError(f"variation is a {type(variation).__name__}; expected a Variation")
     given = {f.name: getattr(variation, f.name) for f in fields(variation)}
     checked = {
         name: arrays.checked(f"variation.{name}", value, *_TRAILING[name])

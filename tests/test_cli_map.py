@@ -45,6 +45,12 @@ def test_json_is_whole_and_the_same_whatever_the_workers(tmp_path):
     assert json.loads(kept.read_text()) == answer
 
 
+def test_payload_says_that_the_drives_hold_it_at_rest():
+    done = kr16("map payload --y 0 --x 1000 --z 900")
+    assert done.code == 0
+    assert "held at rest by the torques of the drives alone" in done.out
+
+
 @pytest.mark.parametrize("quantity", ["manipulability", "condition", "torque"])
 def test_every_quantity_has_a_table(quantity):
     done = kr16("map", quantity, "--grid", "500", "--z", "0:1500", "--abc", "0 90 0")

@@ -219,6 +219,7 @@ def test_other_robot_is_simulated(capsys: pytest.CaptureFixture[str]) -> None:
         (f"simulate {_SHORT} --plot run.png", "the suffix must be .pdf"),
         (f"simulate {_SHORT} --plot none/run.pdf", "cannot be written"),
         (f"simulate {_SHORT} --step 0.01", "belongs to RK4 or SemiImplicitEuler"),
+        (f"simulate {_SHORT} --method RK4 --step -1", "solver.step_s = -1.0: must be > 0 s"),
     ],
 )
 def test_bad_input_ends_with_one_line_and_code_2(
@@ -272,6 +273,15 @@ def test_failed_run_is_saved_marked_and_told(
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no SIGINT to a child on Windows")
+def test_table_of_a_run_that_went_astray_stays_narrow(capsys: pytest.CaptureFixture[str]) -> None:
+    fast = "--qd 500 500 500 500 500 500 --method RK4 --step 0.1 --duration 2"
+    assert kr16(f"simulate free_swing {fast}") == 1
+    shown, errors = capsys.readouterr()
+    assert "INCOMPLETE" in shown and "e+" in shown
+    assert max(map(len, shown.splitlines())) < 120
+    assert "the simulation ended at" in errors
+
+
 def test_interrupt_leaves_what_was_there(folder: Path) -> None:
     (folder / "slow.toml").write_text(_SLOW)
     (folder / "run.csv").write_text("before")

@@ -75,3 +75,15 @@ def test_without_a_scenario_the_help_is_shown():
     done = kr16("sweep")
     assert (done.code, done.out) == (2, "")
     assert "--vary payload.mass" in done.err
+
+
+def test_levels_without_end_are_refused_before_they_fill_the_memory() -> None:
+    done = kr16("sweep", "free_swing", "--vary", "payload.mass=0:16:1000000000")
+    assert done.code == 2
+    assert "COUNT is 1000000000; at most 1000000 are possible" in done.err
+
+
+def test_robot_without_inertia_is_refused_before_any_run() -> None:
+    done = kr16("sweep", "free_swing", "--vary", "payload.mass=0:16:3", "--robot", "kr16_l6")
+    assert done.code == 2
+    assert "no inertial data" in done.err

@@ -89,3 +89,10 @@ def test_drives_and_payload_count():
 )
 def test_bad_input_is_one_line(words, told):
     complains(kr16(words), *told)
+
+
+def test_few_samples_are_told() -> None:
+    few = kr16("uncertainty", "--q", "0", "-90", "90", "0", "0", "0", "--samples", "20")
+    enough = kr16("uncertainty", "--q", "0", "-90", "90", "0", "0", "0", "--samples", "100")
+    assert few.code == enough.code == 0
+    assert "20 robots drawn are few" in few.err and "are few" not in enough.err

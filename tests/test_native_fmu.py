@@ -142,6 +142,13 @@ def test_arrays_are_checked_and_run_element_by_element(tmp_path: Path) -> None:
     complains(kr16("fmu", "run", arrays, "--set", "q_start[7]=1"), "no parameter q_start[7]")
 
 
+def test_check_against_another_robot_names_both() -> None:
+    done = kr16("fmu", "check", native.file(), "--robot", "chapter3")
+    assert done.code == 1
+    for word in ("Dynamics of the KUKA KR 16-2", "Chapter 3 test arm", "--robot"):
+        assert word in done.err
+
+
 @pytest.mark.parametrize("version", [2, 3])
 def test_documents_follow_their_schemas(version: int) -> None:
     etree = pytest.importorskip("lxml.etree")

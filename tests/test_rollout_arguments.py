@@ -40,6 +40,7 @@ from rollout_cases import START
         ({"wrench": [1.0] * 6, "wrench_axes": "tool"}, "wrench_axes is 'tool'"),
         ({"q": np.zeros((3, 6)), "tau": np.zeros((2, 6))}, "leading shapes do not broadcast"),
         ({"threads": 0}, "threads is 0"),
+        ({"variation": {"payload_mass": 1.0}}, "variation is a dict; expected a Variation"),
         ({"variation": Variation(payload_mass=-1.0)}, "payload_mass holds -1"),
         ({"variation": Variation(payload_com=(0, 0, 1))}, "payload_com needs"),
         ({"variation": Variation(gravity=(0, 0))}, "variation.gravity has shape (2,)"),

@@ -217,7 +217,7 @@ def test_drawn_robots_move_as_the_simulator_moves_them(data):
 
 def test_friction_under_a_torque_that_follows_the_angles_has_no_bands_of_the_path():
     scenario = with_options("drop_gravity_compensated", {"drives": True, "duration_s": 0.05})
-    told = trust.answer(work_for(DATA, POSES, 2, scenario=scenario))
+    told = trust.answer(work_for(DATA, POSES, trust.FEW, scenario=scenario))
     assert "motion" not in told["result"]
     assert told["warnings"] == [
         "the torque is of kind gravity: its torque has bands, its path is taken as the nominal one"
@@ -267,7 +267,7 @@ def test_a_record_for_reports_names_what_matters_most():
 
 
 def test_numbers_without_a_tolerance_are_said_to_be_taken_as_exact():
-    assert trust.answer(work_for(DATA, POSES, 2, drives=True))["warnings"] == []
+    assert trust.answer(work_for(DATA, POSES, trust.FEW, drives=True))["warnings"] == []
 
     def bare(part):
         return replace(part, provenance=replace(part.provenance, tolerances={}))
@@ -278,8 +278,8 @@ def test_numbers_without_a_tolerance_are_said_to_be_taken_as_exact():
         links=(*DATA.links[:4], *map(bare, DATA.links[4:])),
     )
     known = "no tolerance is stated for link 5, link 6"
-    assert trust.answer(work_for(data, POSES, 2))["warnings"] == [f"{known}; taken as exact"]
-    assert trust.answer(work_for(data, POSES, 2, drives=True))["warnings"] == [
+    assert trust.answer(work_for(data, POSES, trust.FEW))["warnings"] == [f"{known}; taken as exact"]
+    assert trust.answer(work_for(data, POSES, trust.FEW, drives=True))["warnings"] == [
         f"{known}, the drive of A2, the drive of A3; taken as exact"
     ]
 

@@ -41,7 +41,7 @@ int kr16_reset(kr16_instance *instance)
     memset(core, 0, sizeof *core);
     memcpy(core->value, kr16_robot.start, sizeof core->value);
     core->tolerance = 1e-8;
-    instance->stop = HUGE_VAL;
+    core->stop = HUGE_VAL;
     return OK;
 }
 

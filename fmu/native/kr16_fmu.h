@@ -106,7 +106,7 @@ typedef struct {
     double value[SLOTS]; /* the state is value[SLOT_Q] and what follows */
     double rise[INPUTS];
     kr16_plant plant;
-    double tolerance, hint;
+    double stop, tolerance, hint; /* stop: infinite where none was told */
     double cs[12];       /* cosines and sines of the angles, if the group of none is up to date */
     uint32_t fresh;      /* groups that are up to date */
     uint32_t beyond;     /* joints that are beyond their limits */
@@ -124,7 +124,6 @@ struct kr16_instance {
     int model_exchange, event_mode, early_return, version; /* 2 or 3 */
     int logging;
     uint32_t categories;
-    double stop; /* of the experiment; infinite where none was told */
     kr16_teller *tell;
     kr16_between *between;
     void *environment;

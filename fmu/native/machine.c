@@ -41,7 +41,7 @@ int kr16_setup(kr16_instance *instance, int has_tolerance, double tolerance, dou
     if (has_tolerance && !(tolerance > 0.0 && isfinite(tolerance)))
         return kr16_fail(instance, "tolerance %g: must be a positive number", tolerance);
     instance->core.value[SLOT_TIME] = start;
-    instance->stop = has_stop ? stop : HUGE_VAL;
+    instance->core.stop = has_stop ? stop : HUGE_VAL;
     if (has_tolerance) /* finer than rounding allows no step */
         instance->core.tolerance = fmax(tolerance, 1e-13);
     instance->core.ready = 0;
@@ -217,11 +217,11 @@ int kr16_do_step(kr16_instance *instance, double time, double size, kr16_step_re
                          "communication point %g s: the instance stands at %g s; go on from there, "
                          "or set back its state first",
                          time, now);
-    if (!(time + size <= instance->stop + fmax(slack, 1e-6 * size)))
+    if (!(time + size <= core->stop + fmax(slack, 1e-6 * size)))
         return kr16_fail(instance,
                          "communication step of %g s at %g s: it goes past the stop time, %g s; make "
                          "it smaller",
-                         size, time, instance->stop);
+                         size, time, core->stop);
     if (kr16_ready(instance) != OK)
         return ERROR;
     if (!(size / core->plant.step <= MOST_PARTS))

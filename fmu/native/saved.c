@@ -1,4 +1,5 @@
 /* Saved states: the core as it is. The first eight bytes are 0, as one importer frees them. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -94,10 +95,12 @@ int kr16_write_state(kr16_instance *instance, const void *state, void *bytes, si
     if (!bytes || size < sizeof *s)
         return kr16_fail(instance, "serializeFMUState: %lu bytes are too few; %lu are needed",
                          bytes ? (unsigned long)size : 0ul, (unsigned long)sizeof *s);
+    saved copy;
+    memcpy(&copy, s, sizeof copy);
+    copy.core.stop = HUGE_VAL; /* what goes on elsewhere is another experiment */
+    copy.check = checked(&copy);
     memset(bytes, 0, size);
-    memcpy(bytes, s, sizeof *s);
-    const uint64_t check = checked(s);
-    memcpy((char *)bytes + offsetof(saved, check), &check, sizeof check);
+    memcpy(bytes, &copy, sizeof copy);
     return OK;
 }
 

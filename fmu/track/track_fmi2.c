@@ -20,13 +20,12 @@ static const char *const phases[] = {"instantiated", "initializing", "stepping",
 /* All that a saved state holds. The first eight bytes are 0, as one importer frees them. */
 typedef struct {
     uint64_t zero, build;
-    double time, start, rate;
+    double time, stop, start, rate; /* stop: infinite where none was told */
     int32_t phase, unused;
 } saved;
 
 typedef struct {
     saved now;
-    double stop; /* of the experiment; infinite where none was told */
     fmi2CallbackLogger log;
     void *environment;
     char *name;
@@ -80,8 +79,7 @@ static uint64_t build(void)
 
 static void begin(source *self)
 {
-    self->now = (saved){.build = build(), .rate = 1.0};
-    self->stop = HUGE_VAL;
+    self->now = (saved){.build = build(), .stop = HUGE_VAL, .rate = 1.0};
 }
 
 const char *fmi2GetTypesPlatform(void)
@@ -149,7 +147,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2R
         return fail(self, "setupExperiment: start time %g, stop time %g: must be finite and rising",
                     start, stop);
     self->now.time = start;
-    self->stop = has_stop ? stop : HUGE_VAL;
+    self->now.stop = has_stop ? stop : HUGE_VAL;
     return fmi2OK;
 }
 
@@ -241,7 +239,7 @@ NONE(SetString, const fmi2String)
 static int usable(const saved *state)
 {
     return state && state->zero == 0 && state->build == build() && isfinite(state->time) &&
-           isfinite(state->start) && 1e-3 <= state->rate && state->rate <= 1e3 &&
+           isfinite(state->start) && !isnan(state->stop) && 1e-3 <= state->rate && state->rate <= 1e3 &&
            state->phase >= INSTANTIATED && state->phase <= TERMINATED;
 }
 
@@ -291,7 +289,10 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte b
     if (size < sizeof self->now)
         return fail(self, "serializeFMUstate: %lu bytes are too few; %lu are needed",
                     (unsigned long)size, (unsigned long)sizeof self->now);
-    memcpy(bytes, state, sizeof self->now);
+    saved copy;
+    memcpy(&copy, state, sizeof copy);
+    copy.stop = HUGE_VAL; /* what goes on elsewhere is another experiment */
+    memcpy(bytes, &copy, sizeof copy);
     return fmi2OK;
 }
 
@@ -360,9 +361,9 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
     if (!(fabs(time - now) <= fmax(slack, 1e-6 * size)))
         return fail(self, "communication point %g s: the instance stands at %g s; go on from there",
                     time, now);
-    if (!(time + size <= self->stop + fmax(slack, 1e-6 * size)))
+    if (!(time + size <= self->now.stop + fmax(slack, 1e-6 * size)))
         return fail(self, "communication step of %g s at %g s: it goes past the stop time, %g s",
-                    size, time, self->stop);
+                    size, time, self->now.stop);
     self->now.time = time + size;
     return fmi2OK;
 }

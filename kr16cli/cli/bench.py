@@ -6,7 +6,7 @@ import typer
 
 from kr16cli.cli import options as o
 from kr16cli.cli import output as out
-from kr16cli.cli import render, run
+from kr16cli.cli import render, run, values
 from kr16cli.cli.command import Command, new_app
 
 app = new_app()
@@ -21,7 +21,7 @@ def bench(
         str, typer.Option("--threads", metavar="N", help="Of the second column.")
     ] = "2",
     robot: o.Robot = None,
-    format_: o.Format = None,
+    format_: o.Told = None,
     json: o.Json = False,
     output: o.Output = None,
 ) -> None:
@@ -34,17 +34,15 @@ def bench(
     """
     from kr16cli.api import Robot
     from kr16cli.bench import report
-    from kr16cli.errors import InputError
 
-    if not threads.isdigit() or int(threads) < 1:
-        raise InputError(f"--threads is {threads}; it must be a whole number of 1 or more")
+    count = values.whole(threads, "--threads", 1, 64) or 1
     kind = out.choose_format(format_, json, output, ("table", "json"))
     with out.Target(output) as target:
         answer = report.bench(
             Robot(run.load(ctx)),
             n=4096 if quick else 100_000,
-            threads=int(threads),
-            rounds=1 if quick else 5,
+            threads=count,
+            rounds=1 if quick else 10,
             with_peers=peers,
         )
         target.write(render.json_text(answer) if kind == "json" else report.table(answer))

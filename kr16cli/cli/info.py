@@ -16,7 +16,7 @@ app = new_app()
 def info(
     ctx: typer.Context,
     robot: o.Robot = None,
-    format_: o.Format = None,
+    format_: o.Told = None,
     json: o.Json = False,
     output: o.Output = None,
 ) -> None:

@@ -10,7 +10,7 @@ from kr16cli.cli import options as o
 
 def chapter(
     ctx: typer.Context, quick: checks.Quick = False, seed: checks.Seed = None,
-    format_: o.Format = None, json: o.Json = False, output: o.Output = None,
+    format_: o.Told = None, json: o.Json = False, output: o.Output = None,
 ) -> None:  # fmt: skip
     """Judge every printed equation of chapter 3; 0 when every verdict is proved.
 
@@ -21,7 +21,7 @@ def chapter(
 
 
 def model(
-    ctx: typer.Context, file: checks.UrdfFile, robot: o.Robot = None, format_: o.Format = None,
+    ctx: typer.Context, file: checks.UrdfFile, robot: o.Robot = None, format_: o.Told = None,
     json: o.Json = False, junit: checks.Junit = None, output: o.Output = None,
 ) -> None:  # fmt: skip
     """Judge somebody's URDF of this arm: what differs, and by how much.
@@ -34,7 +34,7 @@ def model(
 
 def poses(
     ctx: typer.Context, file: checks.PoseFile, si: o.Si = False, robot: o.Robot = None,
-    format_: o.Format = None, json: o.Json = False, junit: checks.Junit = None,
+    format_: o.Told = None, json: o.Json = False, junit: checks.Junit = None,
     output: o.Output = None,
 ) -> None:  # fmt: skip
     """Judge recorded joint angles and poses: residuals, best-fit base and tool, outliers.

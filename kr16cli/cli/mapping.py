@@ -180,6 +180,11 @@ def table(answer: Mapping[str, Any], *, si: bool = False) -> str:
     if rows:
         header = ["", "least", "mean", "largest", "", f"least at {unit}", f"largest at {unit}"]
         lines += render.grid(header, rows)
+    if asked["quantity"] == "payload":
+        lines.append(
+            "held at rest by the torques of the drives alone; the rating in motion is far less: "
+            "kr16 info"
+        )
     for row in result["envelope"]:
         verdict = "within" if row["within"] else "BEYOND"
         lines.append(

@@ -39,6 +39,7 @@ Strict = Annotated[
 Format = Annotated[
     str | None, typer.Option("--format", metavar="FORMAT", help="table, json, csv or npz.")
 ]
+Told = Annotated[str | None, typer.Option("--format", metavar="FORMAT", help="table or json.")]
 Json = Annotated[bool, typer.Option("--json", help="Short for --format json.")]
 Output = Annotated[
     str | None,

@@ -8,6 +8,7 @@ from typing import Any
 Cell = Any
 # Decimals of a table by unit; other numbers get six significant digits.
 _DECIMALS = {"mm": 3, "deg": 4, "m": 6, "rad": 6}
+_LARGE = 1e12  # from here on decimals mean nothing: what is left of a failed run
 
 
 class Encoded(list[str]):
@@ -74,6 +75,8 @@ def shown(cell: Cell, unit: str | None = None) -> str:
     decimals = _DECIMALS.get(unit or "")
     if decimals is None:
         return f"{cell + 0.0:.6g}"
+    if abs(cell) >= _LARGE:
+        return f"{cell:.6e}"
     text = f"{cell:.{decimals}f}"
     return text[1:] if text.startswith("-") and float(text) == 0.0 else text
 

@@ -28,7 +28,7 @@ def sweep(
     fresh: studies.Fresh = False,
     plot: studies.Plot = None,
     robot: o.Robot = None,
-    format_: o.Format = None,
+    format_: o.Told = None,
     json: o.Json = False,
     output: o.Output = None,
 ) -> None:

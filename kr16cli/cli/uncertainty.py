@@ -29,7 +29,7 @@ def uncertainty(
     plot: studies.Plot = None,
     si: o.Si = False,
     robot: o.Robot = None,
-    format_: o.Format = None,
+    format_: o.Told = None,
     json: o.Json = False,
     output: o.Output = None,
 ) -> None:

@@ -14,7 +14,7 @@ app = new_app(cls=LeanGroup, invoke_without_command=True)
 @app.callback()
 def verify(
     ctx: typer.Context, suite: checks.Suite = None, quick: checks.Quick = False,
-    seed: checks.Seed = None, robot: o.Robot = None, format_: o.Format = None,
+    seed: checks.Seed = None, robot: o.Robot = None, format_: o.Told = None,
     json: o.Json = False, junit: checks.Junit = None, list_: checks.List = False,
     output: o.Output = None, figures: checks.Figures = False,
     self_test: checks.SelfTest = False,

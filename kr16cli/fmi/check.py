@@ -72,8 +72,20 @@ def check(
     except InputError as error:
         problems.append(f"the direct simulator refuses it: {error}")
     else:
-        return compared.report(columns, problems, allowed, after=exchange)
+        report = compared.report(columns, problems, allowed, after=exchange)
+        return report._replace(problems=[*_other_robot(fmu, data, report), *report.problems])
     return Report(problems, [], allowed, len(compared.times) - 1)
+
+
+def _other_robot(fmu: Fmu, data: RobotData, report: Report) -> list[str]:
+    """That a native FMU, which holds no robot file, deviates because it is of another robot."""
+    text = fmu.attributes.get("description", "")
+    if not report.problems or fmu.cargo or not _ours(fmu) or f"the {data.name}." in text:
+        return []
+    return [
+        f"the FMU says '{text.partition('.')[0]}' and was compared with {data.name}; give the "
+        "robot it was built for by --robot"
+    ]
 
 
 def _ours(fmu: Fmu) -> bool:

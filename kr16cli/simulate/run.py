@@ -186,5 +186,5 @@ def load_run(path: str | Path) -> Run:
     except OSError as error:
         raise FileError(path, f"cannot be read: {error.strerror or error}") from None
     except Exception as error:  # zip, NumPy and JSON each complain in their own way
-        reason = " ".join(str(error).split())
+        reason = " ".join(str(error.args[0] if error.args else error).split())
         raise FileError(path, f"holds no run of kr16 simulate: {reason}") from None

@@ -18,6 +18,7 @@ Kind = Literal["factorial", "latin", "monte-carlo"]
 
 _STREAM = 2  # which of a seed's tables of random numbers
 MOST_RUNS = 10**8
+MOST_LEVELS = 10**6
 
 
 class Variable(NamedTuple):
@@ -70,9 +71,10 @@ def variable(text: str) -> Variable:
         raise InputError(
             f"--vary {text}: COUNT is {parts[2]}; it must be a whole number of 2 or more"
         )
-    return Variable(
-        path, tuple(np.linspace(low, high, int(parts[2])).tolist()), low, high, False, factor
-    )
+    count = int(parts[2])
+    if count > MOST_LEVELS:
+        raise InputError(f"--vary {text}: COUNT is {count}; at most {MOST_LEVELS} are possible")
+    return Variable(path, tuple(np.linspace(low, high, count).tolist()), low, high, False, factor)
 
 
 def _number(text: str, whole: str) -> float:

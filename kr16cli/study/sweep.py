@@ -18,10 +18,11 @@ import numpy as np
 from kr16cli.arrays import Array
 from kr16cli.errors import FileError, Kr16Error
 from kr16cli.robot import RobotData
-from kr16cli.robot_file import parse_data
+from kr16cli.robot_file import load_data, parse_data
 from kr16cli.simulate.experiment import simulate
 from kr16cli.simulate.run import Run
 from kr16cli.simulate.scenario import load_scenario, parse_scenario, read_table, scenario_file
+from kr16cli.single import Arm
 from kr16cli.study import open_runs
 from kr16cli.study.design import Design
 from kr16cli.study.open_runs import Case
@@ -224,10 +225,11 @@ def sweep_of(
 
     Raises:
         FileError, ParameterError: the files themselves must be sound.
-        InputError: a path that names no number.
+        InputError: a path that names no number, or a robot without inertial data.
     """
     file = scenario_file(scenario)
     load_scenario(file)
+    Arm(load_data(robot_file)).require_inertia()
     robot = tomllib.loads(Path(robot_file).read_text(encoding="utf-8-sig"))
     tables = Tables(read_table(file), robot)
     return SweepWork(tables, robot_file, str(file), str(file.parent), design, simulator)

@@ -19,6 +19,9 @@ from kr16cli.study.work import Chunk, in_memory
 from kr16cli.units import deg
 
 SCHEMA = "kr16.uncertainty/1"
+FEW = 100
+"""Of fewer samples, the ends of a band are nearly the outermost ones."""
+
 _BAND = (2.5, 50.0, 97.5)  # per cent of the samples: the 95 % band and its middle
 _AGREEING = 0.1
 _JOINTS = ("A1", "A2", "A3", "A4", "A5", "A6")
@@ -142,6 +145,8 @@ def _plain(values: dict[str, Any]) -> dict[str, Any]:
 
 def _warnings(work: UncertaintyWork, result: dict[str, Any]) -> list[str]:
     texts = taken_as_exact(work.data, drives=work.drives)
+    if work.samples < FEW:
+        texts.append(f"{work.samples} robots drawn are few for bands of 95 %; draw {FEW} or more")
     if work.scenario is not None and work.steps is None:
         texts.append(
             f"{answered(work.scenario)}: its torque has bands, its path is taken as the nominal one"
