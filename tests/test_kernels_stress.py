@@ -214,3 +214,23 @@ def test_process_does_not_grow_over_a_million_calls() -> None:
     before = _resident()
     _calls(350_000)
     assert _resident() - before < 4_000_000
+
+
+@native
+@pytest.mark.parametrize("name", ["fk", "jacobian", "gravity", "christoffel"])
+@pytest.mark.parametrize("beyond", [0, 1, 7, 8, 39])
+def test_large_results_go_past_the_caches_wherever_they_begin(
+    robot: kr16cli.Robot, name: str, beyond: int
+) -> None:
+    ask = getattr(robot, name)
+    shape = ask(np.zeros(6)).shape
+    width = int(np.prod(shape))
+    n = (1 << 18) // width + 1 + beyond
+    q = np.random.default_rng(beyond).uniform(-3.0, 3.0, (n, 6))
+    want = np.concatenate([ask(part) for part in np.array_split(q, 300)])
+    for offset in range(8):
+        room = np.full(n * width + 16, 7.0)
+        out = room[offset : offset + n * width].reshape(n, *shape)
+        ask(q, out=out, threads=1 + offset % 2)
+        assert (out == want).all()
+        assert (room[:offset] == 7.0).all() and (room[offset + n * width :] == 7.0).all()

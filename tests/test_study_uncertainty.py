@@ -278,7 +278,9 @@ def test_numbers_without_a_tolerance_are_said_to_be_taken_as_exact():
         links=(*DATA.links[:4], *map(bare, DATA.links[4:])),
     )
     known = "no tolerance is stated for link 5, link 6"
-    assert trust.answer(work_for(data, POSES, trust.FEW))["warnings"] == [f"{known}; taken as exact"]
+    assert trust.answer(work_for(data, POSES, trust.FEW))["warnings"] == [
+        f"{known}; taken as exact"
+    ]
     assert trust.answer(work_for(data, POSES, trust.FEW, drives=True))["warnings"] == [
         f"{known}, the drive of A2, the drive of A3; taken as exact"
     ]

@@ -104,18 +104,44 @@ static int guarded(const double *rows, int count)
 }
 
 /* A tile's results as rows of the caller's array. */
-KR16_CLONES_OF static void store(const double *y, int width, int lanes, int stream, double *out)
+KR16_CLONES_OF static void store(const double *y, int width, int lanes, double *out)
 {
     _Alignas(64) double rows[KR16_BLOCK * KR16_MAX_RESULTS];
     for (int i = 0; i < lanes; i += KR16_BLOCK) {
         const int whole = i + KR16_BLOCK <= lanes;
         double *to = out + (ptrdiff_t)i * width;
-        kr16_to_rows(y + i, width, whole && !stream ? to : rows);
-        if (whole && stream)
-            kr16_stream(rows, KR16_BLOCK * width, to);
-        else if (!whole)
+        kr16_to_rows(y + i, width, whole ? to : rows);
+        if (!whole)
             memcpy(to, rows, (size_t)((lanes - i) * width) * sizeof *to);
     }
+}
+
+/* The same past the caches, line by line; what a block leaves of a line waits for the next one.
+ * The lines at both ends are shared with others and stored as usual: in parts they stream slowly. */
+KR16_CLONES_OF static void store_past(const double *y, int width, int lanes, double *out)
+{
+    _Alignas(64) double rows[KR16_LINE + KR16_BLOCK * KR16_MAX_RESULTS];
+    const ptrdiff_t ahead = -((uintptr_t)out / sizeof *out) % KR16_LINE;
+    ptrdiff_t waiting = 0;
+    for (int i = 0; i < lanes; i += KR16_BLOCK) {
+        const int count = lanes - i < KR16_BLOCK ? lanes - i : KR16_BLOCK;
+        const double *from = rows;
+        kr16_to_rows(y + i, width, rows + waiting);
+        waiting += (ptrdiff_t)count * width;
+        if (i == 0) {
+            const ptrdiff_t first = ahead < waiting ? ahead : waiting;
+            memcpy(out, rows, (size_t)first * sizeof *out);
+            from += first;
+            out += first;
+            waiting -= first;
+        }
+        const ptrdiff_t lines = waiting / KR16_LINE * KR16_LINE;
+        kr16_stream(from, lines, out);
+        out += lines;
+        waiting -= lines;
+        memmove(rows, from + lines, (size_t)waiting * sizeof *rows);
+    }
+    memcpy(out, rows, (size_t)waiting * sizeof *out);
 }
 
 static int run_range(const kr16_kernel *k, const double *p, const double *const *inputs,
@@ -132,7 +158,7 @@ static int run_range(const kr16_kernel *k, const double *p, const double *const 
             break;
         k->run(p, x, y);
         verdict = guarded(y + k->width * LANES, k->guards);
-        store(y, k->width, lanes, stream, out + lo * k->width);
+        (stream ? store_past : store)(y, k->width, lanes, out + lo * k->width);
     }
     if (stream)
         kr16_stream_end();
@@ -189,7 +215,7 @@ int kr16_run(int kernel, const double *p, const double *const *inputs, ptrdiff_t
 {
     const kr16_kernel *k = &kr16_batch_kernels[kernel];
     const ptrdiff_t tiles = (n + LANES - 1) / LANES;
-    const int stream = n * k->width >= STREAMED && (uintptr_t)out % 16 == 0;
+    const int stream = n * k->width >= STREAMED && (uintptr_t)out % sizeof *out == 0;
     if (threads > MAX_THREADS)
         threads = MAX_THREADS;
     if (threads > tiles)

@@ -7,6 +7,7 @@
 #define KR16_TURN_H
 
 #include <stddef.h>
+#include <stdint.h>
 #include <string.h>
 
 #ifdef __SSE2__
@@ -16,6 +17,7 @@
 #include "kr16_tile.h"
 
 #define KR16_BLOCK 8
+#define KR16_LINE 8 /* numbers of a cache line */
 #define INLINED static inline __attribute__((always_inline))
 
 typedef double kr16_lanes8 __attribute__((vector_size(64)));
@@ -94,12 +96,12 @@ INLINED void kr16_to_rows(const double *columns, int width, double *rows)
     }
 }
 
-/* Copy past the caches: large results are not read again soon, and lines that are written
- * whole need not be fetched first. `to` is aligned to 16 bytes. */
+/* Copy whole lines past the caches: large results are not read again soon, and lines that are
+ * written whole need not be fetched first. `to` is aligned to a line, `count` a multiple of 8. */
 INLINED void kr16_stream(const double *from, ptrdiff_t count, double *to)
 {
 #ifdef __SSE2__
-    for (ptrdiff_t i = 0; i + 2 <= count; i += 2)
+    for (ptrdiff_t i = 0; i < count; i += 2)
         _mm_stream_pd(to + i, _mm_loadu_pd(from + i));
 #else
     memcpy(to, from, (size_t)count * sizeof *to);
