@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from kr16cli.errors import InputError
 from kr16cli.robot_file import load_data
 from kr16cli.simulate.scenario import load_scenario, with_options
 from kr16cli.study import open_runs, sweep, sweep_facts
@@ -134,13 +135,11 @@ def test_what_the_compiled_solvers_cannot_finish_goes_to_the_simulator(tmp_path)
         assert rows[name][2:].tolist() == slow[name][2:].tolist()
 
 
-def test_a_robot_without_inertias_is_told_in_every_row():
+def test_a_robot_without_inertias_is_refused_before_any_run():
     bare = str(load_data("kr16_l6").path)
-    work = sweep.sweep_of(bare, "free_swing", design(["duration_s=0.1"], latin=None,
-                                                     monte_carlo=None, seed=1))  # fmt: skip
-    with finished(work) as store:
-        rows = sweep_facts.whole(work, store)
-    assert "inertial" in rows["status"][0]
+    asked = design(["duration_s=0.1"], latin=None, monte_carlo=None, seed=1)
+    with pytest.raises(InputError, match="no inertial data"):
+        sweep.sweep_of(bare, "free_swing", asked)
 
 
 def test_neighbours_move_a_run_by_rounding_alone(monkeypatch):

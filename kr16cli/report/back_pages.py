@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from kr16cli.report.content import Content, asset_hashes, commands, environment
+from kr16cli.report.content import Content, LackingError, asset_hashes, commands, environment
 from kr16cli.report.page import FULL, LEADING, LEFT, RIGHT, Document, Page
 from kr16cli.report.style import INK, MUTED, RED, STATUS_COLOUR, STATUS_WORD, number
 from kr16cli.report.suite_tables import measured, sampled
@@ -105,7 +105,13 @@ def _verdict(results: Sequence[Result]) -> Cell:
 
 
 def cases(document: Document, content: Content) -> None:
-    """Every case in full."""
+    """Every case in full.
+
+    Raises:
+        LackingError: the report holds no cases, such as one of a run alone.
+    """
+    if not content.results:
+        raise LackingError("no cases were run for this report")
     title = "Every case in full"
     page = document.page(title)
     page.paragraph(

@@ -26,5 +26,7 @@ def test_motions_beside_pinocchio_and_steps_of_the_fmu(
     ratios = {f.what: s / f.seconds for f in figures for s in f.peers.values()}
     benchmark.extra_info["ratios"] = ratios
     benchmark.extra_info["seconds"] = {f.what: f.seconds for f in figures}
-    assert len(ratios) == len(motion.METHODS)
-    assert len(figures) == len(ratios) + len(motion._MODES) + 1
+    swings = [f for f in figures if "SciPy" in f.what]
+    assert len(swings) == len(motion.METHODS) and all(f.peers for f in swings)
+    assert len(ratios) > len(swings)  # FMUs beside each other, too
+    assert all(f.seconds > 0.0 for f in figures)
